@@ -1,0 +1,84 @@
+"""Reading and writing the study's files.
+
+Every file appears under its name only when it is whole: it is written beside its place under a hidden name and
+then renamed, so that an interrupted job leaves either the old file or none.
+"""
+
+import os
+import secrets
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+import yaml
+
+
+@contextmanager
+def replacing(path: str | os.PathLike) -> Iterator[Path]:
+    """Give a temporary path beside `path` (same suffix); what was written there takes its place at the end.
+
+    The folder of `path` is made. After an exception the temporary file is removed and `path` is left as it was.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{secrets.token_hex(4)}.{path.name}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike) -> None:
+    """Write a dataset as netCDF-4, arrays of numbers compressed without loss, coordinates without a fill value."""
+    encoding = {}
+    for name, variable in dataset.variables.items():
+        numeric = variable.dtype.kind in "fiub"
+        encoding[name] = {"zlib": True, "complevel": 4, "shuffle": True} if numeric and variable.size > 1 else {}
+        if variable.dtype.kind == "f" and name in dataset.coords:
+            encoding[name]["_FillValue"] = None
+    with replacing(path) as temporary:
+        dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)
+
+
+def read_netcdf(path: str | os.PathLike) -> xr.Dataset:
+    """Read a whole netCDF file into memory and close it."""
+    return xr.load_dataset(path, engine="netcdf4")
+
+
+def write_table(table: pd.DataFrame, path: str | os.PathLike) -> None:
+    """Write a table as CSV, without its index, numbers with ten digits, missing values empty."""
+    with replacing(path) as temporary:
+        table.to_csv(temporary, index=False, float_format="%.10g", lineterminator="\n")
+
+
+def read_table(path: str | os.PathLike) -> pd.DataFrame:
+    """Read a CSV table."""
+    return pd.read_csv(path)
+
+
+def write_yaml(document: Mapping, path: str | os.PathLike) -> None:
+    """Write a mapping as YAML in its own order; numpy numbers and arrays become plain ones."""
+    with replacing(path) as temporary:
+        temporary.write_text(
+            yaml.safe_dump(_plain(document), sort_keys=False, allow_unicode=True, width=100), encoding="utf-8"
+        )
+
+
+def read_yaml(path: str | os.PathLike) -> dict:
+    """Read a YAML mapping."""
+    return yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+
+
+def _plain(value):
+    """Copy nested containers with numpy scalars and arrays turned into Python's own numbers and lists."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return value
