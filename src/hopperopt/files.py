@@ -37,7 +37,9 @@ def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     encoding = {}
     for name, variable in dataset.variables.items():
         numeric = variable.dtype.kind in "fiub"
-        encoding[name] = {"zlib": True, "complevel": 4, "shuffle": True} if numeric and variable.size > 1 else {}
+        encoding[name] = (
+            {"zlib": True, "complevel": 4, "shuffle": True} if numeric and variable.size > 1 else {}
+        )
         if variable.dtype.kind == "f" and name in dataset.coords:
             encoding[name]["_FillValue"] = None
     with replacing(path) as temporary:

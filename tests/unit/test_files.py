@@ -44,7 +44,11 @@ def test_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):
 
 def test_yaml_holds_plain_numbers_in_order(tmp_path):
     path = tmp_path / "selected.yaml"
-    document = {"design": {"theta_deg": np.float64(55.0), "length_mm": 40}, "warning": None, "grid": np.arange(2)}
+    document = {
+        "design": {"theta_deg": np.float64(55.0), "length_mm": 40},
+        "warning": None,
+        "grid": np.arange(2),
+    }
     files.write_yaml(document, path)
     back = files.read_yaml(path)
     assert back == {"design": {"theta_deg": 55.0, "length_mm": 40}, "warning": None, "grid": [0, 1]}
@@ -54,6 +58,8 @@ def test_yaml_holds_plain_numbers_in_order(tmp_path):
 
 def test_table_has_no_index_and_keeps_empty_cells(tmp_path):
     path = tmp_path / "table.csv"
-    files.write_table(pd.DataFrame({"case": ["bare", "selected"], "predicted_J": [np.nan, 0.0123456789]}), path)
+    files.write_table(
+        pd.DataFrame({"case": ["bare", "selected"], "predicted_J": [np.nan, 0.0123456789]}), path
+    )
     assert path.read_text() == "case,predicted_J\nbare,\nselected,0.0123456789\n"
     assert files.read_table(path)["predicted_J"].isna().tolist() == [True, False]
