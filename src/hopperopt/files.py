@@ -1,7 +1,7 @@
 """Reading and writing the study's files.
 
-Every file appears under its name only when it is whole: it is written beside its place under a hidden name and
-then renamed, so that an interrupted job leaves either the old file or none.
+Every file appears under its name only when it is whole: it is written beside its place under a hidden name
+and then renamed, so that an interrupted job leaves either the old file or none.
 """
 
 import os
@@ -20,7 +20,7 @@ import yaml
 def replacing(path: str | os.PathLike) -> Iterator[Path]:
     """Give a temporary path beside `path` (same suffix); what was written there takes its place at the end.
 
-    The folder of `path` is made. After an exception the temporary file is removed and `path` is left as it was.
+    The folder of `path` is made. After an exception the temporary file is removed and `path` is as it was.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -33,7 +33,7 @@ def replacing(path: str | os.PathLike) -> Iterator[Path]:
 
 
 def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike) -> None:
-    """Write a dataset as netCDF-4, arrays of numbers compressed without loss, coordinates without a fill value."""
+    """Write a dataset as netCDF-4, arrays of numbers compressed, coordinates without a fill value."""
     encoding = {}
     for name, variable in dataset.variables.items():
         numeric = variable.dtype.kind in "fiub"

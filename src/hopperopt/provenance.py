@@ -1,4 +1,4 @@
-"""Where a result comes from: digests of code, the state of git, versions and host; and the compiled code's cache.
+"""Where a result comes from: digests of code, git, versions and host; and the compiled code's cache.
 
 Digests decide what must be computed anew; git, versions and host are only recorded.
 """
@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -26,9 +26,10 @@ LIBRARIES = ("numpy", "numba", "scipy", "pandas", "xarray", "netCDF4", "scikit-l
 def code_digest(*modules: str, package: Path = PACKAGE) -> str:
     """Digest of what the named modules can execute of this package.
 
-    modules: dotted names, e.g. "hopperopt.experiment". The digest covers the code, without comments, docstrings and
-    layout, of these modules and of all that they import from the package, at their top or inside functions. It is
-    the same on every Python version. Nothing is imported. Raises ValueError for a name that is no module.
+    modules: dotted names, e.g. "hopperopt.experiment". The digest covers the code, without comments,
+    docstrings and layout, of these modules and of all that they import from the package, at their top or
+    inside functions. It is the same on every Python version. Nothing is imported. Raises ValueError for a
+    name that is no module.
     """
     for module in modules:
         if _source_file(package, module) is None:
@@ -62,7 +63,7 @@ def _source_file(package: Path, module: str) -> Path | None:
 
 @functools.cache
 def _read_module(package: Path, module: str, path: Path, _mtime: int) -> tuple[str, tuple[str, ...]]:
-    """Return a module's code as normalised text, and the names that it may import (not all of them are modules)."""
+    """Return a module's code as normalised text, and the names that it may import (some are no modules)."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     parent = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
     names = []
@@ -106,7 +107,7 @@ def _version(library: str) -> str:
 
 
 def git_state() -> str:
-    """Commit of the clone that this package runs from, with `-dirty` after local edits; `unknown` without git."""
+    """Commit of the clone that this package runs from, `-dirty` after local edits; `unknown` without git."""
     try:
         # A package inside another project's repository (say, its environment) is not tracked there.
         _git("ls-files", "--error-unmatch", "__init__.py")
@@ -133,10 +134,11 @@ def attributes() -> dict[str, str]:
 
 
 def use_numba_cache() -> Path:
-    """Give numba a cache directory of this solver's code, to be called before numba is imported; return it.
+    """Give numba a cache directory of this solver's code and return it, before numba is imported.
 
-    Numba does not see that a function called from another file has changed, hence a directory per digest of all of
-    the solver's code, below $XDG_CACHE_HOME or ~/.cache, or below the temporary directory where that is not writable.
+    Numba does not see that a function called from another file has changed, hence a directory per digest of
+    all of the solver's code, below $XDG_CACHE_HOME or ~/.cache, or below the temporary directory where that
+    cannot be written.
     """
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     fallback = os.path.join(tempfile.gettempdir(), f"cache-{os.getuid()}")
@@ -160,15 +162,13 @@ def use_numba_cache() -> Path:
 
 @contextmanager
 def numba_cache_lock() -> Iterator[None]:
-    """Hold the lock of the compiled code's cache: the first process compiles while the others wait, then load.
+    """Hold the lock of the compiled code's cache: the first process compiles, the others wait, then load.
 
     The lock ends with the process that holds it. A file system without locks is used without.
     """
     with open(use_numba_cache() / "lock", "w") as lock:
-        try:
+        with suppress(OSError):
             fcntl.flock(lock, fcntl.LOCK_EX)
-        except OSError:
-            pass
         yield
 
 
