@@ -16,8 +16,12 @@ import xarray as xr
 import yaml
 
 
+class InputError(ValueError):
+    """What a person gave cannot be used; the message is all that needs to be said."""
+
+
 @contextmanager
-def replacing(path: str | os.PathLike) -> Iterator[Path]:
+def atomic(path: str | os.PathLike) -> Iterator[Path]:
     """Give a temporary path beside `path` (same suffix); what was written there takes its place at the end.
 
     The folder of `path` is made. After an exception the temporary file is removed and `path` is as it was.
@@ -42,7 +46,7 @@ def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         )
         if variable.dtype.kind == "f" and name in dataset.coords:
             encoding[name]["_FillValue"] = None
-    with replacing(path) as temporary:
+    with atomic(path) as temporary:
         dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)
 
 
@@ -53,7 +57,7 @@ def read_netcdf(path: str | os.PathLike) -> xr.Dataset:
 
 def write_table(table: pd.DataFrame, path: str | os.PathLike) -> None:
     """Write a table as CSV, without its index, numbers with ten digits, missing values empty."""
-    with replacing(path) as temporary:
+    with atomic(path) as temporary:
         table.to_csv(temporary, index=False, float_format="%.10g", lineterminator="\n")
 
 
@@ -64,7 +68,7 @@ def read_table(path: str | os.PathLike) -> pd.DataFrame:
 
 def write_yaml(document: Mapping, path: str | os.PathLike) -> None:
     """Write a mapping as YAML in its own order; numpy numbers and arrays become plain ones."""
-    with replacing(path) as temporary:
+    with atomic(path) as temporary:
         temporary.write_text(
             yaml.safe_dump(_plain(document), sort_keys=False, allow_unicode=True, width=100), encoding="utf-8"
         )

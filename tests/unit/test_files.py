@@ -35,7 +35,7 @@ def test_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):
     path = tmp_path / "run.nc"
     files.write_netcdf(sample(), path)
     before = path.read_bytes()
-    with pytest.raises(RuntimeError), files.replacing(path) as temporary:
+    with pytest.raises(RuntimeError), files.atomic(path) as temporary:
         temporary.write_text("half a file")
         raise RuntimeError
     assert path.read_bytes() == before
