@@ -1,0 +1,185 @@
+"""The plan's runs gathered in one dataset, and which runs may be data points at all."""
+
+import os
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from hopperopt import files, outflow
+
+# What a run that did not end well cannot tell; its counts and monitors stay, to show what went wrong.
+RESULTS = ("discharge_time", "discharge_rate", "mass_flow_index")
+UNITS = {"deg": "degree", "mm": "mm", "m": "m", "s": "s"}
+
+
+def gather(
+    params: Mapping, design: str | os.PathLike, simulations: Iterable, output: str, table: str
+) -> None:
+    """Write the plan's dataset (netCDF) and a table of its runs (CSV).
+
+    params: `factors`, the names of the factor columns of the table `design`; `incomplete`, refuse or drop.
+    simulations: the runs' files, named EXPERIMENT_rep_REPLICATE.nc. Raises files.InputError naming the runs
+    that did not end well, unless they are to be dropped: then they are NaN in the dataset.
+    """
+    runs = read_runs(simulations)
+    unusable = unusable_runs(runs)
+    if unusable and params["incomplete"] != "drop":
+        raise files.InputError(refusal(unusable))
+    plan = files.read_table(design).set_index("experiment")[list(params["factors"])]
+    dataset = assemble(plan, runs, unusable)
+    files.write_netcdf(dataset, output)
+    files.write_table(table_of_runs(dataset), table)
+
+
+def read_runs(paths: Iterable) -> dict[tuple[str, int], xr.Dataset]:
+    """Read runs by (name, replicate), both from the file's name NAME_rep_REPLICATE.nc."""
+    runs = {}
+    for path in map(Path, paths):
+        match = re.fullmatch(r"(.+)_rep_(\d+)\.nc", path.name)
+        if match is None:
+            raise files.InputError(f"{path}: a run's file is named NAME_rep_REPLICATE.nc")
+        runs[match[1], int(match[2])] = files.read_netcdf(path)
+    return runs
+
+
+def unusable_runs(runs: Mapping[tuple[str, int], xr.Dataset]) -> dict[tuple[str, int], str]:
+    """Reason, in words, for each run that is no data point: everything but status `complete`."""
+    return {key: _reason(run) for key, run in runs.items() if run["status"].item() != "complete"}
+
+
+def _reason(run: xr.Dataset) -> str:
+    status = run["status"].item()
+    inside = f"{float(run['residual_mass_fraction']):.1%} of the mass stayed inside"
+    return {
+        "jammed": f"jammed, {inside}",
+        "incomplete": f"incomplete at its time limit, {inside}",
+        "unsettled": f"unsettled, the bed still moved after {float(run['filling_time']):.3g} s of filling",
+        "monitor": "monitor, out of its bounds: "
+        f"overlap {float(run['max_overlap']):.3g} of the smaller radius, "
+        f"speed {float(run['max_speed_ratio']):.3g} of free fall, "
+        f"{int(run['lost_particles'])} particles lost, energy gain {float(run['max_energy_gain']):.2%}",
+    }.get(status, status)
+
+
+def refusal(unusable: Mapping[tuple[str, int], str]) -> str:
+    """One line per run that is refused, and what can be done."""
+    lines = [f"{name}_rep_{replicate}: {reason}" for (name, replicate), reason in unusable.items()]
+    return "\n".join(["runs that are no data points (`incomplete: drop` leaves them out):", *lines])
+
+
+def assemble(plan: pd.DataFrame, runs: Mapping, unusable: Mapping) -> xr.Dataset:
+    """Dataset of all runs: dims experiment, replicate, size_class, M.
+
+    plan: factor values in the columns, experiments in the index; runs and reasons by (experiment, replicate).
+    """
+    replicates = sorted({replicate for _, replicate in runs})
+    missing = [f"{e}_rep_{r}" for e in plan.index for r in replicates if (e, r) not in runs]
+    if missing:
+        raise files.InputError(f"no run of {', '.join(missing)}")
+    target = _common_target(runs)
+    rows = []
+    for experiment in plan.index:
+        row = [_data_point(runs[experiment, r], target, (experiment, r) in unusable) for r in replicates]
+        rows.append(xr.concat(row, "replicate", coords="minimal", compat="override", join="exact"))
+    dataset = xr.concat(rows, "experiment", coords="minimal", compat="override", join="exact")
+    return _described(dataset.assign_coords(_coordinates(plan, replicates, target)), unusable)
+
+
+def _common_target(runs: Mapping) -> np.ndarray:
+    """Mass fractions m_k0 of the batch, which must be those of every run."""
+    targets = {
+        key: outflow.batch_fractions(run["diameter"].values, run["size_class"].values)
+        for key, run in runs.items()
+    }
+    (name, first), *others = targets.items()
+    for other, target in others:
+        if not np.allclose(target, first, rtol=0, atol=1e-9):
+            raise files.InputError(f"the batches of {name} and {other} differ in composition")
+    return first
+
+
+def _data_point(run: xr.Dataset, target: np.ndarray, unusable: bool) -> xr.Dataset:
+    """Everything that the dataset holds of one run."""
+    scalars = run[[name for name, variable in run.data_vars.items() if variable.ndim == 0]].reset_coords(
+        drop=True
+    )
+    scalars.attrs = {}
+    composition = outflow.outflow(run["exit_time"].values, run["diameter"].values, run["size_class"].values)
+    fraction, variance = composition if not unusable else np.full_like(composition, np.nan)
+    if unusable:
+        scalars = scalars.assign({name: scalars[name].where(False) for name in RESULTS})
+    return scalars.assign(
+        mass_fraction=(("size_class", "M"), fraction),
+        counting_variance=(("size_class", "M"), variance),
+        J=("size_class", outflow.objective(fraction, target)),
+        U=("size_class", outflow.corrected_square(fraction, target, variance)),
+    )
+
+
+def _coordinates(plan: pd.DataFrame, replicates: list[int], target: np.ndarray) -> dict:
+    factors = {
+        name: ("experiment", plan[name].to_numpy(dtype=float), factor_attributes(name))
+        for name in plan.columns
+    }
+    return {
+        "experiment": ("experiment", plan.index.astype(str).to_numpy(dtype=object), {"long_name": "experiment"}),
+        "replicate": ("replicate", replicates, {"long_name": "replicate, a filling with its own seed"}),
+        "size_class": ("size_class", list(outflow.SIZE_CLASSES), {"long_name": "size class"}),
+        "M": ("M", outflow.GRID, {"long_name": "discharged mass fraction", "units": "1"}),
+        "target_fraction": (
+            "size_class", target, {"long_name": "mass fraction of the batch", "units": "1"}
+        ),
+        **factors,
+    }  # fmt: skip
+
+
+def factor_attributes(name: str) -> dict[str, str]:
+    """CF attributes of a factor: its unit is the end of its name (`length_mm`)."""
+    quantity, _, unit = name.rpartition("_")
+    known = quantity and unit in UNITS
+    return {
+        "long_name": (quantity if known else name).replace("_", " "),
+        "units": UNITS[unit] if known else "1",
+    }
+
+
+def _described(dataset: xr.Dataset, unusable: Mapping) -> xr.Dataset:
+    """Attach attributes to the variables made here and to the whole."""
+    names = {
+        "mass_fraction": "mass fraction of the size class in the outflow",
+        "counting_variance": "counting variance of the mass fraction in one run",
+        "J": "raw objective, rms over M of the deviation from the batch",
+        "U": "objective squared, less the counting variance; may be negative",
+    }
+    for name, text in names.items():
+        dataset[name].attrs = {"long_name": text, "units": "1"}
+    dropped = [f"{name}_rep_{replicate}: {reason}" for (name, replicate), reason in unusable.items()]
+    return dataset.assign_attrs(
+        Conventions="CF-1.11",
+        title="Outflow of the hopper in the experiments of the plan",
+        source="discrete element simulations",
+        dropped_runs="; ".join(dropped),
+    )
+
+
+def table_of_runs(dataset: xr.Dataset) -> pd.DataFrame:
+    """One row per run: its factors, status, counts, times, monitors and raw objectives, for people."""
+    stacked = dataset.stack(run=("experiment", "replicate"), create_index=False)
+    columns = ["experiment", "replicate", *_factors(dataset), "status"]
+    scalars = [
+        n for n, v in dataset.data_vars.items() if v.dims == ("experiment", "replicate") and n != "status"
+    ]
+    table = {name: stacked[name].values for name in [*columns, *scalars]}
+    if "filling_level" in table:
+        table["filling_level_mm"] = 1e3 * table.pop("filling_level")
+    for name in dataset["size_class"].values:
+        table[f"J_{name}"] = stacked["J"].sel(size_class=name).values
+    return pd.DataFrame(table)
+
+
+def _factors(dataset: xr.Dataset) -> list[str]:
+    return [name for name, c in dataset.coords.items() if c.dims == ("experiment",) and name != "experiment"]

@@ -1,0 +1,106 @@
+"""The data set holds every run at its place, and no run that did not end well."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hopperopt import dataset, files
+
+PLAN = pd.DataFrame(
+    {
+        "experiment": ["exp_01", "exp_02", "exp_100"],
+        "theta_deg": [60.0, 57.5, 50.0],
+        "length_mm": [20, 30, 40],
+        "theta_deg_level": [1, 2, 5],
+        "length_mm_level": [1, 2, 3],
+    }
+)
+PARAMS = {"factors": ["theta_deg", "length_mm"], "incomplete": "refuse"}
+
+
+@pytest.fixture
+def study(tmp_path, make_run):
+    """Three experiments of two replicates each, told apart by their discharge rate."""
+    files.write_table(PLAN, tmp_path / "design.csv")
+    for row, experiment in enumerate(PLAN["experiment"]):
+        for replicate in (1, 2):
+            run = make_run(seed=10 * row + replicate, discharge_rate=row + replicate / 10)
+            files.write_netcdf(run, tmp_path / f"{experiment}_rep_{replicate}.nc")
+    return tmp_path
+
+
+def gather(study, **params):
+    simulations = sorted(study.glob("exp_*.nc"), reverse=True)
+    dataset.gather(
+        PARAMS | params, study / "design.csv", simulations, study / "dataset.nc", study / "runs.csv"
+    )
+    return files.read_netcdf(study / "dataset.nc")
+
+
+def spoil(study, make_run, name, **changes):
+    files.write_netcdf(make_run(**changes), study / name)
+
+
+def test_runs_stand_at_their_experiment_and_replicate(study):
+    data = gather(study)
+    assert data["mass_fraction"].dims == ("experiment", "replicate", "size_class", "M")
+    assert data["experiment"].values.tolist() == ["exp_01", "exp_02", "exp_100"]
+    np.testing.assert_allclose(data["discharge_rate"], [[0.1, 0.2], [1.1, 1.2], [2.1, 2.2]])
+    np.testing.assert_allclose(data["mass_fraction"].sum("size_class"), 1)
+    assert data["length_mm"].sel(experiment="exp_02") == 30
+    assert "theta_deg_level" not in data.variables
+    assert not (data["J"] ** 2 < data["U"]).any()
+
+
+def test_every_number_has_a_unit_and_a_name(study):
+    data = gather(study)
+    assert data.attrs["Conventions"].startswith("CF-")
+    units = {name: data[name].attrs["units"] for name in ("theta_deg", "length_mm", "discharge_time", "M")}
+    assert units == {"theta_deg": "degree", "length_mm": "mm", "discharge_time": "s", "M": "1"}
+    assert np.allclose(data["target_fraction"], np.array([8, 27, 64]) / 99)
+
+
+def test_runs_that_did_not_end_well_are_refused_by_name_and_reason(study, make_run):
+    spoil(study, make_run, "exp_02_rep_2.nc", status="jammed", stayed=150)
+    spoil(study, make_run, "exp_100_rep_1.nc", status="monitor", max_overlap=0.42)
+    with pytest.raises(files.InputError) as error:
+        gather(study)
+    lines = str(error.value).splitlines()
+    assert "exp_02_rep_2: jammed, 6.1% of the mass stayed inside" in lines
+    assert any(line.startswith("exp_100_rep_1: monitor") and "0.42" in line for line in lines)
+    assert len(lines) == 3
+    assert not (study / "dataset.nc").exists()
+
+
+def test_dropped_runs_are_nan_and_listed(study, make_run):
+    spoil(study, make_run, "exp_02_rep_2.nc", status="jammed", stayed=150)
+    data = gather(study, incomplete="drop")
+    bad = data.sel(experiment="exp_02", replicate=2)
+    assert all(bad[name].isnull().all() for name in ("mass_fraction", "J", "U", "discharge_time"))
+    assert bad["residual_count"] == 150 and bad["status"] == "jammed"
+    assert int(data["J"].isnull().sum()) == 3
+    assert "exp_02_rep_2" in data.attrs["dropped_runs"]
+    table = files.read_table(study / "runs.csv")
+    assert table.loc[table["status"] == "jammed", ["experiment", "replicate"]].values.tolist() == [
+        ["exp_02", 2]
+    ]
+
+
+def test_a_residual_within_the_limit_is_a_data_point(study, make_run):
+    spoil(study, make_run, "exp_01_rep_1.nc", stayed=2)
+    data = gather(study)
+    assert data["residual_count"].sel(experiment="exp_01", replicate=1) == 2
+    assert data["mass_fraction"].notnull().all()
+
+
+def test_batches_of_other_composition_are_refused(study, make_run):
+    run = make_run()
+    files.write_netcdf(run.isel(particle=slice(1, None)), study / "exp_01_rep_1.nc")
+    with pytest.raises(files.InputError, match="differ in composition"):
+        gather(study)
+
+
+def test_a_missing_run_is_named(study):
+    (study / "exp_100_rep_2.nc").unlink()
+    with pytest.raises(files.InputError, match="exp_100_rep_2"):
+        gather(study)
