@@ -1,0 +1,57 @@
+# make                     the locked environment in .venv, then the full study
+# make setup               the environment alone
+# make test, make lint     in the same environment: the tests; style and the boundaries between modules
+# make lock                the newest versions of all libraries into requirements.lock
+# make PYTHON=python3.12   another Python for the environment;   make CORES=4   fewer cores for the study
+
+CORES ?= all
+ifdef PYTHON
+wanted := $(shell $(PYTHON) -c 'import sys; print(sys.version)' 2>/dev/null)
+else
+PYTHON = $(shell for p in python3.11 python3.12 python3.13 python3.14 python3; do \
+	$$p -c '$(suitable)' 2>/dev/null && echo $$p && break; done)
+wanted := $(shell .venv/bin/python -c 'import sys; print(sys.version)' 2>/dev/null)
+endif
+suitable := import ensurepip, sys, venv; sys.exit(sys.implementation.name != "cpython" or not (3, 11) <= sys.version_info < (3, 15))
+stamp := .venv/complete
+install := .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation
+
+.PHONY: study setup test lint lock
+study: setup
+	.venv/bin/snakemake --cores $(CORES)
+
+setup: $(stamp)
+
+test: setup
+	.venv/bin/python -m pytest
+
+lint: setup
+	.venv/bin/ruff check .
+	.venv/bin/lint-imports
+
+# A Python named on the command line that is not the environment's makes it anew; without a name it stays.
+ifneq ($(wanted),$(shell .venv/bin/python -c 'import sys; print(sys.version)' 2>/dev/null))
+.PHONY: $(stamp)
+endif
+
+# The stamp comes last: an environment without it is half made and is made anew from nothing.
+# The build backend goes in first because a few libraries have no wheel. One of them, immutables, wants a compiler on
+# Python 3.14 for an extension that it can do without: with "true" as the compiler it installs without the extension.
+$(stamp): requirements.lock pyproject.toml
+	@if ! $(PYTHON) -c '$(suitable)' 2>/dev/null; then \
+		echo "hopperopt needs CPython 3.11 to 3.14 with venv, and $(if $(PYTHON),$(PYTHON) is not that,none was found)" \
+			"(Debian: apt install python3-venv; to choose one: make PYTHON=python3.12)." >&2; exit 1; fi
+	$(PYTHON) -m venv --clear .venv
+	sed -n '/^setuptools==/,/[^\\]$$/p' requirements.lock > .venv/backend.lock
+	$(install) --require-hashes -r .venv/backend.lock
+	CC=true LDSHARED=true $(install) --require-hashes -r requirements.lock
+	$(install) --editable .
+	.venv/bin/python -m pip check
+	touch $@
+
+lock:
+	set -e; new=$$(mktemp -d); trap 'rm -rf "$$new"' EXIT; cp pyproject.toml "$$new"; \
+	$(PYTHON) -m venv "$$new/venv"; "$$new/venv/bin/pip" install --quiet uv; \
+	echo "# Every library in one version for CPython 3.11 to 3.14, with the hashes of its files. Made by: make lock" > "$$new/lock"; \
+	"$$new/venv/bin/uv" export --quiet --project "$$new" --no-header --no-emit-project --all-extras --all-groups >> "$$new/lock"; \
+	cp "$$new/lock" requirements.lock

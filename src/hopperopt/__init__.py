@@ -1,0 +1,1 @@
+"""Optimisation of a hopper insert against size segregation: simulation, surrogate, optimiser, verification."""
