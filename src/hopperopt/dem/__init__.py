@@ -1,0 +1,1 @@
+"""Discrete element method: spheres and walls of revolution (numpy and numba only)."""

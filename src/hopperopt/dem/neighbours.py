@@ -1,0 +1,202 @@
+"""Re-sorting into cell order and the half Verlet list, with contact histories carried through.
+
+Every rebuild sorts the spheres by cell (x fastest), so that the neighbours of a sphere lie in five contiguous
+row ranges and the lists stay in memory order. A sphere's skin grows with its speed: the few fast ones carry a
+wide skin, the bed a thin one, and all last about equally long. The lists hold as long as every sphere is
+closer to its reference than its own skin.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from hopperopt.dem.state import COUNT, NEEDED, PAIR_CARRIED, PARKED, REMOVED
+
+CELLS_PER_SPHERE = 8  # a coarser grid is used beyond, so that one sphere far away costs no memory
+
+
+@njit
+def carry_pairs(spheres, pairs, counters):
+    """Set the springs of touching pairs aside, under the identities of the two spheres."""
+    found = 0
+    for i in range(counters[COUNT]):
+        for k in range(pairs.start[i], pairs.start[i + 1]):
+            if pairs.touching[k]:
+                pairs.carried[found, 0] = spheres.identity[i]
+                pairs.carried[found, 1] = spheres.identity[pairs.partner[k]]
+                for a in range(3):
+                    pairs.carried_spring[found, a] = pairs.spring[k, a]
+                found += 1
+    counters[PAIR_CARRIED] = found
+
+
+@njit
+def drop_parked(spheres, counters):
+    """Close the gaps that removed spheres left; the order of the others stays."""
+    kept = 0
+    for i in range(counters[COUNT]):
+        if spheres.position[i, 2] <= PARKED / 2.0:
+            continue
+        if kept != i:
+            for a in range(3):
+                spheres.position[kept, a] = spheres.position[i, a]
+                spheres.velocity[kept, a] = spheres.velocity[i, a]
+                spheres.spin[kept, a] = spheres.spin[i, a]
+            spheres.radius[kept] = spheres.radius[i]
+            spheres.mass[kept] = spheres.mass[i]
+            spheres.identity[kept] = spheres.identity[i]
+        kept += 1
+    counters[REMOVED] += counters[COUNT] - kept
+    counters[COUNT] = kept
+
+
+@njit
+def grow_skins(spheres, count, settings):
+    """Reference positions and skins for the lists about to be built. Returns the largest skin, m."""
+    largest = 0.0
+    for i in range(count):
+        squared = 0.0
+        for a in range(3):
+            spheres.reference[i, a] = spheres.position[i, a]
+            squared += spheres.velocity[i, a] ** 2
+        skin = min(settings.skin + settings.horizon * math.sqrt(squared), settings.skin_limit)
+        spheres.skin[i] = skin
+        largest = max(largest, skin)
+    return largest
+
+
+@njit
+def make_grid(spheres, count, reach):
+    """Cells of at least `reach` (m) around the spheres. Returns (corner (3,), cell size, cells along x, y, z)."""
+    low = np.full(3, np.inf)
+    high = np.full(3, -np.inf)
+    for i in range(count):
+        for a in range(3):
+            low[a] = min(low[a], spheres.position[i, a])
+            high[a] = max(high[a], spheres.position[i, a])
+    size = reach
+    cells = np.ones(3, np.int64)
+    while True:
+        for a in range(3):
+            cells[a] = int(min(math.floor((high[a] - low[a]) / size), 1.0e6)) + 1
+        if cells[0] * cells[1] * cells[2] <= CELLS_PER_SPHERE * count + 4096:
+            return low, size, cells
+        size *= 1.25
+
+
+@njit
+def sort_by_cell(spheres, count, corner, size, cells):
+    """Permute the rows into cell order. Returns the first row of each cell, (cells + 1,)."""
+    index = np.empty(count, np.int64)
+    first = np.zeros(cells[0] * cells[1] * cells[2] + 1, np.int64)
+    for i in range(count):
+        x = int((spheres.position[i, 0] - corner[0]) / size)
+        y = int((spheres.position[i, 1] - corner[1]) / size)
+        z = int((spheres.position[i, 2] - corner[2]) / size)
+        index[i] = (z * cells[1] + y) * cells[0] + x
+        first[index[i] + 1] += 1
+    for c in range(len(first) - 1):
+        first[c + 1] += first[c]
+    place = first.copy()
+    order = np.empty(count, np.int64)
+    for i in range(count):
+        order[place[index[i]]] = i
+        place[index[i]] += 1
+    for vectors in (spheres.position, spheres.velocity, spheres.spin, spheres.reference):
+        old = vectors[:count].copy()
+        for i in range(count):
+            for a in range(3):
+                vectors[i, a] = old[order[i], a]
+    for values in (spheres.radius, spheres.mass, spheres.skin):
+        kept = values[:count].copy()
+        for i in range(count):
+            values[i] = kept[order[i]]
+    names = spheres.identity[:count].copy()
+    for i in range(count):
+        spheres.identity[i] = names[order[i]]
+    return first
+
+
+@njit
+def list_pairs(spheres, pairs, count, first, corner, size, cells):
+    """Fill the half list. Returns the entries needed; beyond the capacity nothing is written.
+
+    Rows ahead of i in the same and the next cell of its x row, then the four x rows ahead in y and z.
+    """
+    position, radius, skin = spheres.position, spheres.radius, spheres.skin
+    capacity = len(pairs.partner)
+    nx, ny, nz = cells
+    found = 0
+    for i in range(count):
+        pairs.start[i] = min(found, capacity)
+        x, y, z = position[i, 0], position[i, 1], position[i, 2]
+        own = radius[i] + skin[i]
+        cx = int((x - corner[0]) / size)
+        cy = int((y - corner[1]) / size)
+        cz = int((z - corner[2]) / size)
+        for row in range(5):
+            ry = cy if row == 0 else (cy + 1 if row == 1 else cy + row - 3)
+            rz = cz if row < 2 else cz + 1
+            if ry < 0 or ry >= ny or rz >= nz:
+                continue
+            line = (rz * ny + ry) * nx
+            begin = i + 1 if row == 0 else first[line + max(cx - 1, 0)]
+            end = first[line + min(cx + 1, nx - 1) + 1]
+            for j in range(begin, end):
+                dx, dy, dz = x - position[j, 0], y - position[j, 1], z - position[j, 2]
+                reach = own + radius[j] + skin[j]
+                # Written first, kept by moving on: no branch to mispredict.
+                pairs.partner[min(found, capacity - 1)] = j
+                found += dx * dx + dy * dy + dz * dz < reach * reach
+    pairs.start[count] = min(found, capacity)
+    return found
+
+
+@njit
+def restore_pairs(spheres, pairs, counters):
+    """Put the springs set aside into the new list; a pair whose order flipped changes its sign."""
+    count = counters[COUNT]
+    row = np.full(len(spheres.identity), -1, np.int64)
+    for i in range(count):
+        row[spheres.identity[i]] = i
+    for k in range(pairs.start[count]):
+        pairs.touching[k] = 0
+        for a in range(3):
+            pairs.spring[k, a] = 0.0
+    for c in range(counters[PAIR_CARRIED]):
+        i, j = row[pairs.carried[c, 0]], row[pairs.carried[c, 1]]
+        if i < 0 or j < 0:
+            continue  # one of them has left
+        sign = 1.0
+        if i > j:
+            i, j, sign = j, i, -1.0
+        for k in range(pairs.start[i], pairs.start[i + 1]):
+            if pairs.partner[k] == j:
+                pairs.touching[k] = 1
+                for a in range(3):
+                    pairs.spring[k, a] = sign * pairs.carried_spring[c, a]
+                break
+
+
+@njit
+def rebuild_pairs(spheres, pairs, counters, settings):
+    """Sort the spheres and list their neighbours. Returns False when the list's capacity is too small.
+
+    Then `counters[NEEDED]` says how many entries it takes; called again with a grown list it goes on, since
+    the carried springs are kept under identities. Parked spheres must have been dropped.
+    """
+    count = counters[COUNT]
+    largest_skin = grow_skins(spheres, count, settings)
+    largest_radius = 0.0
+    for i in range(count):
+        largest_radius = max(largest_radius, spheres.radius[i])
+    reach = 2.0 * (largest_radius + largest_skin)
+    corner, size, cells = make_grid(spheres, count, reach)
+    first = sort_by_cell(spheres, count, corner, size, cells)
+    needed = list_pairs(spheres, pairs, count, first, corner, size, cells)
+    if needed > len(pairs.partner):
+        counters[NEEDED] = needed
+        return False
+    restore_pairs(spheres, pairs, counters)
+    return True

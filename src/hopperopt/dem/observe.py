@@ -1,0 +1,74 @@
+"""Sums over the state: energies, momenta."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from hopperopt.dem.contacts import deepest
+from hopperopt.dem.laws import elastic_energy
+from hopperopt.dem.state import COUNT
+
+
+@njit
+def motion_energies(spheres, counters, settings):
+    """Kinetic (translation and spin) and gravitational energy, J.
+
+    Velocities live half a step before the positions, so the heights are taken there, too.
+    """
+    kinetic = potential = 0.0
+    half = 0.5 * settings.time_step
+    for i in range(counters[COUNT]):
+        mass = spheres.mass[i]
+        inertia = 0.4 * mass * spheres.radius[i] ** 2
+        for a in range(3):
+            v, w = spheres.velocity[i, a], spheres.spin[i, a]
+            kinetic += 0.5 * (mass * v * v + inertia * w * w)
+            potential -= mass * settings.gravity[a] * (spheres.position[i, a] - half * v)
+    return kinetic, potential
+
+
+@njit(error_model="numpy")
+def spring_energy(spheres, pairs, touches, walls, counters, settings):
+    """Elastic energy of all contacts with the springs of the last step, J, half a step back like the motion."""
+    total = 0.0
+    half = 0.5 * settings.time_step
+    for i in range(counters[COUNT]):
+        for k in range(pairs.start[i], pairs.start[i + 1]):
+            j = pairs.partner[k]
+            squared = 0.0
+            for a in range(3):
+                d = spheres.position[i, a] - spheres.position[j, a]
+                d -= half * (spheres.velocity[i, a] - spheres.velocity[j, a])
+                squared += d * d
+            r_i, r_j = spheres.radius[i], spheres.radius[j]
+            delta = r_i + r_j - math.sqrt(squared)
+            if delta > 0.0:
+                xi = pairs.spring[k]
+                total += elastic_energy(
+                    delta, (xi[0], xi[1], xi[2]), r_i * r_j / (r_i + r_j), settings.pair_law
+                )
+        for k in range(touches.start[i], touches.start[i + 1]):
+            element, delta, _, _ = deepest(spheres, touches, walls, i, k)
+            if element >= 0:
+                xi = touches.spring[k]
+                total += elastic_energy(delta, (xi[0], xi[1], xi[2]), spheres.radius[i], settings.wall_law)
+    return total
+
+
+def energies(spheres, pairs, touches, walls, counters, settings):
+    """Kinetic, gravitational and elastic energy, J."""
+    kinetic, potential = motion_energies(spheres, counters, settings)
+    return kinetic, potential, spring_energy(spheres, pairs, touches, walls, counters, settings)
+
+
+def momenta(spheres, rows):
+    """Linear momentum (3,) kg m/s and angular momentum about the origin (3,) kg m2/s.
+
+    Exactly conserved by the scheme without walls and gravity when taken with the positions before the drift,
+    i.e. for the velocities' own half step: x x v is the same at both ends of a drift along v.
+    """
+    m = spheres.mass[:rows, None]
+    x, v, w = spheres.position[:rows], spheres.velocity[:rows], spheres.spin[:rows]
+    inertia = 0.4 * m * spheres.radius[:rows, None] ** 2
+    return (m * v).sum(axis=0), (m * np.cross(x, v) + inertia * w).sum(axis=0)
