@@ -13,7 +13,6 @@ from hopperopt import files, outflow
 
 # What a run that did not end well cannot tell; its counts and monitors stay, to show what went wrong.
 RESULTS = ("discharge_time", "discharge_rate", "mass_flow_index")
-UNITS = {"deg": "degree", "mm": "mm", "m": "m", "s": "s"}
 
 
 def gather(
@@ -21,7 +20,7 @@ def gather(
 ) -> None:
     """Write the plan's dataset (netCDF) and a table of its runs (CSV).
 
-    params: `factors`, the names of the factor columns of the table `design`; `incomplete`, refuse or drop.
+    params: `factors`, unit of each factor, a column of the table `design`; `incomplete`, refuse or drop.
     simulations: the runs' files, named EXPERIMENT_rep_REPLICATE.nc. Raises files.InputError naming the runs
     that did not end well, unless they are to be dropped: then they are NaN in the dataset.
     """
@@ -31,6 +30,8 @@ def gather(
         raise files.InputError(refusal(unusable))
     plan = files.read_table(design).set_index("experiment")[list(params["factors"])]
     dataset = assemble(plan, runs, unusable)
+    for name, unit in params["factors"].items():
+        dataset[name].attrs = {"long_name": f"factor {name}", "units": unit}
     files.write_netcdf(dataset, output)
     files.write_table(table_of_runs(dataset), table)
 
@@ -121,30 +122,16 @@ def _data_point(run: xr.Dataset, target: np.ndarray, unusable: bool) -> xr.Datas
 
 
 def _coordinates(plan: pd.DataFrame, replicates: list[int], target: np.ndarray) -> dict:
-    factors = {
-        name: ("experiment", plan[name].to_numpy(dtype=float), factor_attributes(name))
-        for name in plan.columns
-    }
     return {
-        "experiment": ("experiment", plan.index.astype(str).to_numpy(dtype=object), {"long_name": "experiment"}),
+        "experiment": ("experiment", list(map(str, plan.index)), {"long_name": "experiment"}),
         "replicate": ("replicate", replicates, {"long_name": "replicate, a filling with its own seed"}),
         "size_class": ("size_class", list(outflow.SIZE_CLASSES), {"long_name": "size class"}),
         "M": ("M", outflow.GRID, {"long_name": "discharged mass fraction", "units": "1"}),
         "target_fraction": (
             "size_class", target, {"long_name": "mass fraction of the batch", "units": "1"}
         ),
-        **factors,
+        **{name: ("experiment", plan[name].to_numpy(dtype=float)) for name in plan.columns},
     }  # fmt: skip
-
-
-def factor_attributes(name: str) -> dict[str, str]:
-    """CF attributes of a factor: its unit is the end of its name (`length_mm`)."""
-    quantity, _, unit = name.rpartition("_")
-    known = quantity and unit in UNITS
-    return {
-        "long_name": (quantity if known else name).replace("_", " "),
-        "units": UNITS[unit] if known else "1",
-    }
 
 
 def _described(dataset: xr.Dataset, unusable: Mapping) -> xr.Dataset:

@@ -15,6 +15,9 @@ import pandas as pd
 import xarray as xr
 import yaml
 
+# Attributes that every netCDF file written by this process gets, such as versions and host.
+stamp: dict[str, str] = {}
+
 
 class InputError(ValueError):
     """What a person gave cannot be used; the message is all that needs to be said."""
@@ -31,7 +34,7 @@ def atomic(path: str | os.PathLike) -> Iterator[Path]:
     temporary = path.with_name(f".{secrets.token_hex(4)}.{path.name}")
     try:
         yield temporary
-        os.replace(temporary, path)
+        temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -47,7 +50,9 @@ def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         if variable.dtype.kind == "f" and name in dataset.coords:
             encoding[name]["_FillValue"] = None
     with atomic(path) as temporary:
-        dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)
+        dataset.assign_attrs(dataset.attrs | stamp).to_netcdf(
+            temporary, engine="netcdf4", format="NETCDF4", encoding=encoding
+        )
 
 
 def read_netcdf(path: str | os.PathLike) -> xr.Dataset:

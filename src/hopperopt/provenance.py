@@ -140,10 +140,10 @@ def use_numba_cache() -> Path:
     all of the solver's code, below $XDG_CACHE_HOME or ~/.cache, or below the temporary directory where that
     cannot be written.
     """
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    fallback = os.path.join(tempfile.gettempdir(), f"cache-{os.getuid()}")
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path("~", ".cache").expanduser())
+    fallback = Path(tempfile.gettempdir(), f"cache-{os.getuid()}")
     for base in (home, fallback):
-        directory = Path(base).absolute() / "hopperopt" / f"numba-{solver_digest()}"
+        directory = base.absolute() / "hopperopt" / f"numba-{solver_digest()}"
         try:
             directory.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=directory).close()
@@ -166,7 +166,7 @@ def numba_cache_lock() -> Iterator[None]:
 
     The lock ends with the process that holds it. A file system without locks is used without.
     """
-    with open(use_numba_cache() / "lock", "w") as lock:
+    with (use_numba_cache() / "lock").open("w") as lock:
         with suppress(OSError):
             fcntl.flock(lock, fcntl.LOCK_EX)
         yield
@@ -175,6 +175,6 @@ def numba_cache_lock() -> Iterator[None]:
 def compile_solver() -> None:
     """Compile the solver, or load it compiled: once per process, before the first time step."""
     with numba_cache_lock():
-        from hopperopt.dem import step
+        from hopperopt.dem.simulation import compile_solver as compile_all
 
-        step.compile()
+        compile_all()

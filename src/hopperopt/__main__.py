@@ -1,0 +1,7 @@
+"""`python -m hopperopt`."""
+
+import sys
+
+from hopperopt.cli import main
+
+sys.exit(main())

@@ -1,0 +1,225 @@
+"""The command line, `python -m hopperopt`: one command per stage of the workflow, and one simulation by hand.
+
+A stage's command gets its configuration as one JSON string and its files as options; it calls one function,
+`stage(params, *inputs, *outputs)`. What a stage needs is imported when it runs.
+"""
+
+import argparse
+import importlib
+import json
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from hopperopt import provenance
+from hopperopt.document import ConfigError, lookup
+
+BAD_INPUT = 2
+SHORTHANDS = {"theta": "theta_deg", "length": "length_mm", "height": "height_mm"}
+
+
+class Stage(NamedTuple):
+    """A stage of the workflow: its module and function, options of its inputs (`*`: several), outputs."""
+
+    module: str
+    function: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    help: str
+
+
+STAGES = {
+    "design": Stage("design", "write_table", (), ("design.csv",), "write the plan's table"),
+    "gather": Stage(
+        "dataset", "gather", ("design", "simulations*"), ("dataset.nc", "runs.csv"), "gather the plan's runs"
+    ),
+    "filter": Stage(
+        "surrogate.targets", "filter_targets", ("dataset",), ("training.nc",), "clip and split the targets"
+    ),
+    "train": Stage(
+        "surrogate.training", "train", ("training",), ("network.nc", "errors.csv"), "train the networks"
+    ),
+    "optimise": Stage(
+        "optimise",
+        "optimise",
+        ("network",),
+        ("front.csv", "history.nc", "selected.yaml"),
+        "search the best designs and select one",
+    ),
+    "verify": Stage(
+        "verify", "verify", ("simulations*", "network"), ("summary.csv",), "compare prediction and simulation"
+    ),
+}
+SIMULATION = "experiment"
+FIGURES = "figures"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; return the exit status: 0, or 2 for input that cannot be used (said in one sentence)."""
+    logging.basicConfig(level=logging.INFO, format="%(levelname)s: %(message)s", stream=sys.stderr)
+    given = _parser().parse_args(arguments)
+    try:
+        given.run(given)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+    except (ConfigError, OSError, json.JSONDecodeError) as error:
+        return _refused(error)
+    except ValueError as error:
+        # A mistake of the program keeps its traceback.
+        from hopperopt.files import InputError
+
+        if not isinstance(error, InputError):
+            raise
+        return _refused(error)
+    return 0
+
+
+def _refused(error: Exception) -> int:
+    if isinstance(error, OSError) and error.filename is not None:
+        error = f"{error.filename}: {error.strerror}"
+    print(f"hopperopt: {error}", file=sys.stderr)
+    return BAD_INPUT
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="hopperopt", description=__doc__.splitlines()[0])
+    parser.add_argument("--version", action="version", version=f"hopperopt {provenance.version()}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    _add_simulate(commands.add_parser("simulate", help="run one simulation"))
+    for name, stage in STAGES.items():
+        command = commands.add_parser(name, help=stage.help)
+        command.add_argument("--params", type=_json, required=True, metavar="JSON", help="configuration")
+        for option in stage.inputs:
+            count = {"nargs": "+"} if option.endswith("*") else {}
+            command.add_argument(f"--{option.rstrip('*')}", required=True, metavar="FILE", **count)
+        command.add_argument("--output", required=True, nargs=len(stage.outputs), metavar=stage.outputs)
+        command.set_defaults(run=_run_stage, stage=stage)
+    figure = commands.add_parser("figure", help="draw one figure")
+    figure.add_argument("name")
+    figure.add_argument("--params", type=_json, required=True, metavar="JSON", help="configuration")
+    figure.add_argument("--input", nargs="+", required=True, metavar="FILE")
+    figure.add_argument("--output", nargs="+", required=True, metavar="FILE", help="PNG, PDF")
+    figure.set_defaults(run=_draw_figure)
+    return parser
+
+
+def _json(text: str) -> dict:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        raise argparse.ArgumentTypeError(f"no JSON: {error}") from None
+
+
+def _run_stage(given: argparse.Namespace) -> None:
+    """Call the stage's function with its parameters, inputs and outputs."""
+    inputs = [getattr(given, option.rstrip("*")) for option in given.stage.inputs]
+    module = importlib.import_module(f"hopperopt.{given.stage.module}")
+    _stamp_files()
+    getattr(module, given.stage.function)(given.params, *inputs, *given.output)
+
+
+def _draw_figure(given: argparse.Namespace) -> None:
+    module = importlib.import_module(f"hopperopt.{FIGURES}.{given.name}")
+    module.write(given.params, *given.input, given.output)
+
+
+def _stamp_files() -> None:
+    from hopperopt import files
+
+    files.stamp.update(provenance.attributes())
+
+
+def _add_simulate(command: argparse.ArgumentParser) -> None:
+    command.description = "Run one simulation of a design, or of the bare hopper, as the configuration says."
+    command.add_argument(
+        "--configfile",
+        nargs="+",
+        type=Path,
+        default=[Path("config.yaml")],
+        metavar="YAML",
+        help="the study; later files override earlier ones (default: config.yaml)",
+    )
+    for option, name in SHORTHANDS.items():
+        command.add_argument(f"--{option}", metavar="VALUE", help=f"short for --factor {name}=VALUE")
+    command.add_argument(
+        "--factor", action="append", default=[], metavar="NAME=VALUE", help="value of a factor of the study"
+    )
+    command.add_argument("--no-insert", action="store_true", help="the bare hopper")
+    command.add_argument(
+        "--seed", type=int, metavar="N", help="seed of the filling (default: from the study's)"
+    )
+    command.add_argument("--case", type=_json, metavar="JSON", help=argparse.SUPPRESS)
+    command.add_argument("--design", nargs="*", default=[], metavar="YAML", help=argparse.SUPPRESS)
+    command.add_argument("--output", type=Path, required=True, metavar="FILE", help="netCDF file to write")
+    command.set_defaults(run=_simulate)
+
+
+def _simulate(given: argparse.Namespace) -> None:
+    """Run one simulation and write its file, with all that says how it was made."""
+    case = _case(given)
+    # The workflow's digest only makes Snakemake run this anew; what is recorded is the code that runs.
+    case.pop("code", None)
+    given.output.parent.mkdir(parents=True, exist_ok=True)
+    provenance.compile_solver()
+    from hopperopt import experiment, files
+    from hopperopt.progress import Reporter
+
+    _stamp_files()
+    with Reporter(sys.stderr) as progress:
+        dataset = experiment.run(case, progress=progress)
+    dataset.attrs |= {
+        "case": json.dumps(case, sort_keys=True),
+        "code_digest": provenance.code_digest(f"hopperopt.{SIMULATION}"),
+        "seed": case["seed"],
+    }
+    files.write_netcdf(dataset, given.output)
+    print(f"{given.output}: {dataset['status'].item()}", file=sys.stderr)
+
+
+def _case(given: argparse.Namespace) -> dict:
+    """The case to simulate: the workflow's, that of a design found by the study, or one set by hand."""
+    if given.case is not None and not given.design:
+        return given.case
+    from hopperopt import config
+
+    if given.case is not None:
+        from hopperopt import files
+
+        return config.derived_case(given.case, files.read_yaml(given.design[0])["design"])
+    study = config.parse(config.load(given.configfile), Path.cwd())
+    typed = _typed_factors(given)
+    if given.no_insert:
+        if typed:
+            raise ConfigError(f"--no-insert goes without values of factors ({', '.join(typed)})")
+        case = study.simulation_case(None, "by_hand", 1)
+    else:
+        case = config.derived_case(study.derived_params("by_hand", 1), _design(study, typed))
+    return case if given.seed is None else case | {"seed": given.seed}
+
+
+def _typed_factors(given: argparse.Namespace) -> dict[str, str]:
+    """Factor values as typed on the command line, by name."""
+    typed = {name: getattr(given, option) for option, name in SHORTHANDS.items()}
+    design = {name: value for name, value in typed.items() if value is not None}
+    for item in given.factor:
+        name, separator, value = item.partition("=")
+        if not separator:
+            raise ConfigError(f"--factor: {item} is not allowed; allowed: NAME=VALUE")
+        design[name] = value
+    return design
+
+
+def _design(study, typed: dict[str, str]) -> dict[str, float]:
+    """Complete design: factors that were not typed keep the value that their key has in the configuration."""
+    design = {name: lookup(study.document, factor.key) for name, factor in study.factors.items()}
+    for name, value in typed.items():
+        if name not in design:
+            raise ConfigError(f"--factor: {name} is not allowed; allowed: {', '.join(design)}")
+        try:
+            design[name] = float(value)
+        except ValueError:
+            raise ConfigError(f"{name}: {value} is not allowed; allowed: a number") from None
+    return design

@@ -1,0 +1,62 @@
+"""How a simulation's progress is shown: one live line on a terminal, a plain line now and then in a log."""
+
+import time
+from collections.abc import Callable
+from typing import TextIO
+
+LOG_INTERVAL = 10.0  # s
+
+
+class Reporter:
+    """Callable that shows each progress report of a simulation on a text stream.
+
+    A report has `stage`, `time` (simulated s), `particles` (left), `rate` (particle-steps/s) and `remaining`
+    (s to go, None where it cannot be told). Used as a context, it ends a live line at the end.
+    """
+
+    def __init__(self, stream: TextIO, clock: Callable[[], float] = time.monotonic):
+        self._stream = stream
+        self._clock = clock
+        self._live = stream.isatty()
+        self._stage, self._due = None, 0.0
+        self._open_line = False
+
+    def __call__(self, report) -> None:
+        """Show a report; in a log, only at a new stage and every ten seconds."""
+        if self._live:
+            self._stream.write(f"\r\x1b[2K{line(report)}")
+            self._open_line = True
+        elif report.stage != self._stage or self._clock() >= self._due:
+            self._stream.write(f"{line(report)}\n")
+            self._due = self._clock() + LOG_INTERVAL
+        self._stage = report.stage
+        self._stream.flush()
+
+    def __enter__(self) -> "Reporter":
+        return self
+
+    def __exit__(self, *_) -> None:
+        if self._open_line:
+            self._stream.write("\n")
+            self._stream.flush()
+
+
+def line(report) -> str:
+    """One line: stage, simulated time, particles left, speed, time to go."""
+    to_go = "" if report.remaining is None else f", {_duration(report.remaining)} to go"
+    return (
+        f"{report.stage:9} {report.time:7.3f} s simulated, {report.particles:6d} particles left, "
+        f"{report.rate / 1e6:5.1f} million particle-steps/s{to_go}"
+    )
+
+
+def _duration(seconds: float) -> str:
+    minutes, seconds = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return (
+        f"{hours} h {minutes:02d} min"
+        if hours
+        else f"{minutes} min {seconds:02d} s"
+        if minutes
+        else f"{seconds} s"
+    )
