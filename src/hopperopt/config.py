@@ -1,0 +1,627 @@
+"""The study's configuration: a document becomes frozen models, and these give each stage its plain values.
+
+Millimetres and degrees in the document, SI in the case of a simulation. The models' defaults are the paper's
+study. No other module imports pydantic.
+"""
+
+import hashlib
+import json
+import math
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Literal, get_args
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    StringConstraints,
+    ValidationError,
+)
+from pydantic_core import core_schema
+
+from hopperopt import checks, geometry
+from hopperopt import design as plans
+from hopperopt.document import (
+    ConfigError,
+    NotAllowed,
+    load,
+    mistake,
+    odd_keys,
+    read_text,
+    replaced,
+    without_nulls,
+)
+from hopperopt.mistakes import sentences
+from hopperopt.quantity import Quantity
+
+__all__ = ["ConfigError", "Setup", "Study", "derived_case", "load", "parse"]
+
+MM = 1000.0  # millimetres in a metre; dividing by it rounds once, so that 22.5 mm is 0.0225 m
+CLEARANCE = 0.005  # m between the column of falling particles and what is below it
+HEADROOM = 0.020  # m of wall above the column
+RAYLEIGH_SHARE = 0.2  # of `time_step_s: auto`
+
+
+class Number(Quantity):
+    """A quantity as an annotation: `Annotated[float | Literal["auto"], Number(above=0)]`."""
+
+    def __get_pydantic_core_schema__(self, source, handler):
+        """Read the number first; what pydantic then checks already has the annotated type."""
+        kinds = [get_args(kind)[0] if get_args(kind) else kind for kind in get_args(source) or (source,)]
+        words = [None if kind is type(None) else kind for kind in kinds if kind not in (int, float)]
+
+        def read(value):
+            return self.read(value, int in kinds, words)
+
+        return core_schema.no_info_before_validator_function(read, handler(source))
+
+
+Positive = Annotated[float, Number(above=0)]
+NotNegative = Annotated[float, Number(least=0)]
+Share = Annotated[float, Number(least=0, most=1)]
+Any = Annotated[float, Number()]
+Count = Annotated[int, Number(least=1)]
+Seed = Annotated[int, Number(least=0)]
+Poisson = Annotated[float, Number(least=0, most=0.5)]
+Name = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$")]
+
+
+class Model(BaseModel):
+    """A section: frozen, no other keys than its own."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Hopper(Model):
+    """A conical hopper below a cylinder."""
+
+    outlet_radius_mm: Positive = 22.5
+    half_angle_deg: Annotated[float, Number(above=0, most=90)] = 45.0
+    cylinder_radius_mm: Positive = 50.0
+
+    @property
+    def _shape(self):
+        return self.outlet_radius_mm / MM, self.half_angle_deg, self.cylinder_radius_mm / MM
+
+    @property
+    def cone_top(self):
+        """Height of the cone's upper edge (m)."""
+        return geometry.cone_height(*self._shape)
+
+    def profile(self, top):
+        """The wall from the outlet up to `top` (m)."""
+        return geometry.hopper(*self._shape, max(top, self.cone_top))
+
+
+class Cone(Model):
+    """A solid cone, apex up: slope angle from the horizontal, length along the slope."""
+
+    slope_deg: Annotated[float, Number(above=0, below=90)] = 55.0
+    length_mm: Positive = 40.0
+
+    def profile(self):
+        """Profile above the insert's height (m)."""
+        return geometry.cone(self.slope_deg, self.length_mm / MM)
+
+
+class Profile(Model):
+    """A body of one's own: points r, z (z from the insert's height), in a CSV file or typed in."""
+
+    file: Annotated[str, StringConstraints(min_length=1)] | None = None
+    points_mm: tuple[tuple[Any, Any], ...] | None = None
+
+    def profile(self):
+        """Profile above the insert's height (m)."""
+        return geometry.raised([[r / MM, z / MM] for r, z in self.points_mm], 0.0)
+
+
+class Insert(Model):
+    """The body in the hopper; `shape` picks one of the sections below it."""
+
+    shape: Literal["cone", "profile", "none"] = "cone"
+    height_mm: Positive = 29.6
+    cone: Cone = Cone()
+    profile: Profile = Profile()
+
+    def polyline(self):
+        """The insert's profile in its place (m), None for the bare hopper."""
+        if self.shape == "none":
+            return None
+        return geometry.raised(getattr(self, self.shape).profile(), self.height_mm / MM)
+
+
+def _ascending(diameters):
+    if len(diameters) != 3 or list(diameters) != sorted(diameters):
+        raise NotAllowed("three diameters, ascending or equal (fine, intermediate, coarse)")
+    return diameters
+
+
+class Particles(Model):
+    """Spheres: equal numbers of three diameters, one material."""
+
+    diameters_mm: Annotated[tuple[Positive, ...], AfterValidator(_ascending)] = (2.0, 3.0, 4.0)
+    density_kg_m3: Positive = 2285.0
+    shear_modulus_pa: Positive = 1.0e7
+    poisson_ratio: Poisson = 0.25
+
+    @property
+    def diameters(self):
+        """Fine, intermediate, coarse (m)."""
+        return [diameter / MM for diameter in self.diameters_mm]
+
+    @property
+    def rayleigh_time(self):
+        """Rayleigh time (s) of the smallest sphere, pi R sqrt(rho/G) / (0.1631 nu + 0.8766)."""
+        wave = math.sqrt(self.density_kg_m3 / self.shear_modulus_pa) / (0.1631 * self.poisson_ratio + 0.8766)
+        return math.pi * self.diameters[0] / 2 * wave
+
+
+class Wall(Model):
+    """Material of hopper, gate and insert; an infinite modulus is a rigid wall."""
+
+    shear_modulus_pa: Annotated[float, Number(above=0, infinite=True)] = 2.2e7
+    poisson_ratio: Poisson = 0.25
+
+
+class Friction(Model):
+    """How a particle touches another body."""
+
+    static_friction: NotNegative
+    rolling_friction: NotNegative
+    restitution: Share
+
+
+class ParticleContact(Friction):
+    """Particle against particle."""
+
+    static_friction: NotNegative = 0.5
+    rolling_friction: NotNegative = 0.05
+    restitution: Share = 0.7
+
+
+class WallContact(Friction):
+    """Particle against hopper, gate and insert."""
+
+    static_friction: NotNegative = 0.5
+    rolling_friction: NotNegative = 0.25
+    restitution: Share = 0.2
+
+
+class Contact(Model):
+    """The contact law's numbers; `rolling` names the model of rolling friction."""
+
+    rolling: Literal["edem", "cdt", "none"] = "edem"
+    particle: ParticleContact = ParticleContact()
+    wall: WallContact = WallContact()
+
+
+def _thirds(count):
+    if count is not None and count % 3:
+        raise NotAllowed("null or a multiple of 3 (equal numbers of the three sizes)")
+    return count
+
+
+class Filling(Model):
+    """How the hopper is filled: up to a level, or with a fixed number of particles."""
+
+    level_mm: Positive = 74.0
+    particles: Annotated[int | None, Number(least=3, most=10_000_000), AfterValidator(_thirds)] = None
+    bed_solid_fraction: Annotated[float, Number(above=0, most=0.74)] = 0.55
+    column_solid_fraction: Annotated[float, Number(above=0, most=0.3)] = 0.2
+    speed_m_s: NotNegative = 0.5
+    speed_scatter_m_s: NotNegative = 0.05
+    settling_limit_s: Positive = 1.5
+
+
+class Discharge(Model):
+    """How the discharge is measured, and what becomes of one that does not end."""
+
+    sensor_mm: Annotated[float, Number(below=0)] = -12.0
+    idle_limit_s: Positive = 0.5
+    time_limit_s: Positive = 10.0
+    incomplete: Literal["refuse", "drop"] = "refuse"
+
+
+class Simulation(Model):
+    """Time step (`auto`: a fifth of the Rayleigh time) and gravity."""
+
+    time_step_s: Annotated[float | Literal["auto"], Number(above=0)] = 4.0e-5
+    gravity_m_s2: Positive = 9.81
+
+
+class Setup(Model):
+    """All that one simulation needs."""
+
+    seed: Seed = 1
+    hopper: Hopper = Hopper()
+    insert: Insert = Insert()
+    particles: Particles = Particles()
+    wall: Wall = Wall()
+    contact: Contact = Contact()
+    filling: Filling = Filling()
+    discharge: Discharge = Discharge()
+    simulation: Simulation = Simulation()
+
+    @cached_property
+    def document(self):
+        """The models as plain nested dicts."""
+        return self.model_dump()
+
+    def with_values(self, values):
+        """The same with other values at dotted keys that exist; ConfigError when one is not allowed."""
+        document = self.document
+        for key, value in values.items():
+            document = replaced(document, key, value)
+        try:
+            return type(self).model_validate(document)
+        except ValidationError as error:
+            raise ConfigError("\n".join(sentences(_errors(error), type(self)))) from None
+
+    @cached_property
+    def insert_profile(self):
+        """The insert's polyline (m), None without one."""
+        return self.insert.polyline()
+
+    @property
+    def column_bottom(self):
+        """Height (m) above which the particles start to fall: clear of bed, insert and the hopper's cone."""
+        apex = 0.0 if self.insert_profile is None else self.insert_profile[:, 1].max()
+        return max(self.filling.level_mm / MM, self.hopper.cone_top, apex) + CLEARANCE
+
+    @property
+    def particle_count(self):
+        """The fixed number, or what fills the hopper around its insert up to the level."""
+        if self.filling.particles is not None:
+            return self.filling.particles
+        level = self.filling.level_mm / MM
+        volume = geometry.volume_inside(self.hopper.profile(level), level)
+        if self.insert_profile is not None:
+            volume -= geometry.solid_volume(self.insert_profile, level)
+        return geometry.particle_count(self.filling.bed_solid_fraction, volume, self.particles.diameters)
+
+    @property
+    def time_step(self):
+        """Time step (s)."""
+        step = self.simulation.time_step_s
+        return float(f"{RAYLEIGH_SHARE * self.particles.rayleigh_time:.6g}") if step == "auto" else step
+
+    def case(self, labels, seed):
+        """One simulation as plain JSON values in SI; `labels` are the design's factor values as typed."""
+        filling, discharge, spheres = self.filling, self.discharge, self.particles
+        count, coarse_radius = self.particle_count, spheres.diameters[2] / 2
+        column_radius = self.hopper.cylinder_radius_mm / MM - coarse_radius
+        sphere_volume = math.pi / 6 * sum(diameter**3 for diameter in spheres.diameters) / 3
+        column = count * sphere_volume / (filling.column_solid_fraction * math.pi * column_radius**2)
+        hopper = self.hopper.profile(self.column_bottom + column + HEADROOM)
+        return {
+            "walls": {
+                "hopper": hopper.tolist(),
+                "gate": geometry.gate(self.hopper.outlet_radius_mm / MM).tolist(),
+                "insert": None if self.insert_profile is None else self.insert_profile.tolist(),
+            },
+            "particles": {
+                "diameters": spheres.diameters,
+                "counts": [count // 3] * 3,
+                "density": spheres.density_kg_m3,
+                "shear_modulus": spheres.shear_modulus_pa,
+                "poisson_ratio": spheres.poisson_ratio,
+            },
+            "wall": {"shear_modulus": self.wall.shear_modulus_pa, "poisson_ratio": self.wall.poisson_ratio},
+            "contact": self.contact.model_dump(),
+            "filling": {
+                "level": filling.level_mm / MM,
+                "column_radius": round(column_radius, geometry.DECIMALS),
+                "column_bottom": round(float(self.column_bottom), geometry.DECIMALS),
+                "solid_fraction": filling.column_solid_fraction,
+                "speed": filling.speed_m_s,
+                "speed_scatter": filling.speed_scatter_m_s,
+                "settling_limit": filling.settling_limit_s,
+            },
+            "discharge": {
+                "sensor": discharge.sensor_mm / MM,
+                "idle_limit": discharge.idle_limit_s,
+                "time_limit": discharge.time_limit_s,
+            },
+            "time_step": self.time_step,
+            "gravity": self.simulation.gravity_m_s2,
+            "seed": seed,
+            "design": {name: float(value) for name, value in labels.items()},
+        }
+
+
+class Factor(Model):
+    """A number of the configuration that the designs vary, and its levels."""
+
+    key: str
+    levels: Annotated[tuple[Any, ...], Field(min_length=2)]
+
+
+def _power_of_two(count):
+    if count & (count - 1):
+        raise NotAllowed("a power of two (others lose the balance of Sobol' points)")
+    return count
+
+
+class Hypercube(Model):
+    """Latin hypercube within the ranges of the levels."""
+
+    experiments: Annotated[int, Number(least=2, most=10_000)] = 25
+    seed: Seed = 1
+
+
+class Sobol(Model):
+    """Sobol' points within the ranges of the levels."""
+
+    experiments: Annotated[int, Number(least=2, most=10_000), AfterValidator(_power_of_two)] = 32
+    seed: Seed = 1
+
+
+class OwnPlan(Model):
+    """A plan of one's own: a CSV file, read when the configuration is."""
+
+    file: Annotated[str, StringConstraints(min_length=1)] = "plan.csv"
+
+
+class Design(Model):
+    """Which designs are simulated, and how often."""
+
+    plan: Literal["l25", "lhs", "sobol", "csv"] = "l25"
+    replicates: Count = 1
+    lhs: Hypercube = Hypercube()
+    sobol: Sobol = Sobol()
+    csv: OwnPlan = OwnPlan()
+
+
+class Surrogate(Model):
+    """The network: filter, split, hidden sizes and starts."""
+
+    clip_sigma: Annotated[float | None, Number(above=0)] = 3.0
+    hidden_nodes: Annotated[tuple[Count, ...], Field(min_length=1)] = (3, 4, 5, 6, 7, 8, 9, 10)
+    starts: Count = 100
+    selected_hidden_nodes: Annotated[int | Literal["auto"], Number(least=1)] = 7
+    split: Literal["experiments", "points"] = "experiments"
+    validation_experiments: Count = 4
+    test_experiments: Count = 4
+    seed: Seed = 1
+
+
+class Optimise(Model):
+    """NSGA-II and the choice from its front."""
+
+    population: Annotated[int, Number(least=4)] = 100
+    generations: Count = 30
+    crossover_probability: Share = 0.9
+    mutation_probability: Share = 0.1
+    seed: Seed = 1
+    select: Literal["knee", "compromise", "explicit"] = "knee"
+    explicit: dict[Name, Any] = {}
+
+
+FIXED = ("plan_centre", "bare")
+DERIVED = ("selected",)
+
+
+def _read_case(value):
+    """A verification case: one of the words, or a number for each factor."""
+    if isinstance(value, str) and value in (*DERIVED, *FIXED):
+        return value
+    allowed = f"{', '.join((*DERIVED, *FIXED))}, or a number for each factor"
+    if not isinstance(value, dict) or not value:
+        raise NotAllowed(allowed)
+    try:
+        return {str(name): Quantity().read(number) for name, number in value.items()}
+    except NotAllowed:
+        raise NotAllowed(allowed) from None
+
+
+class Verification(Model):
+    """The designs that are simulated anew, by name."""
+
+    replicates: Count = 1
+    cases: dict[Name, Annotated[str | dict[str, float], BeforeValidator(_read_case)]] = {
+        "selected": "selected",
+        "plan_centre": "plan_centre",
+        "bare": "bare",
+    }
+
+
+class Figures(Model):
+    """How the figures are drawn."""
+
+    dpi: Annotated[int, Number(least=50, most=1200)] = 200
+
+
+def _results_dir(value):
+    if not value.strip() or set(value) & set("{}\n\\"):
+        raise NotAllowed("the path of a folder, without braces or backslashes")
+    return Path(value).as_posix()
+
+
+def _paper_factors():
+    return {
+        "theta_deg": Factor(key="insert.cone.slope_deg", levels=(60, 57.5, 55, 52.5, 50)),
+        "length_mm": Factor(key="insert.cone.length_mm", levels=(50, 45, 40, 35, 30)),
+        "height_mm": Factor(key="insert.height_mm", levels=(34, 32, 29.6, 28, 26)),
+    }
+
+
+class Study(Setup):
+    """The whole study."""
+
+    results_dir: Annotated[str, AfterValidator(_results_dir)] = "results"
+    factors: Annotated[dict[Name, Factor], Field(min_length=1)] = Field(default_factory=_paper_factors)
+    design: Design = Design()
+    surrogate: Surrogate = Surrogate()
+    optimise: Optimise = Optimise()
+    verification: Verification = Verification()
+    figures: Figures = Figures()
+    _own_plan: list = PrivateAttr(default_factory=list)
+
+    @property
+    def levels(self):
+        """The levels of each factor, by name."""
+        return {name: factor.levels for name, factor in self.factors.items()}
+
+    def with_design(self, design):
+        """The study at one design (factor values by name); raises ConfigError when a value is not allowed."""
+        if unknown := [name for name in design if name not in self.factors]:
+            raise ConfigError("\n".join(mistake("factor", name, ", ".join(self.factors)) for name in unknown))
+        return self.with_values({self.factors[name].key: value for name, value in design.items()})
+
+    def without_insert(self):
+        """The study in the bare hopper."""
+        return self.with_values({"insert.shape": "none"})
+
+    @cached_property
+    def plan(self):
+        """The experiments (name, design, level numbers) of the plan."""
+        match self.design.plan:
+            case "l25":
+                return plans.l25(self.levels)
+            case "lhs":
+                return plans.lhs(self.levels, self.design.lhs.experiments, self.design.lhs.seed)
+            case "sobol":
+                return plans.sobol(self.levels, self.design.sobol.experiments, self.design.sobol.seed)
+            case "csv":
+                return self._own_plan
+
+    def experiments(self):
+        """(name, design) of each experiment of the plan, in its order."""
+        return [(experiment.name, experiment.design) for experiment in self.plan]
+
+    def cases(self):
+        """Verification cases by name: "derived" (from the optimum), a design, or None (no insert)."""
+        meaning = {"selected": "derived", "plan_centre": plans.centre(self.levels), "bare": None}
+        return {
+            name: meaning[case] if isinstance(case, str) else case
+            for name, case in self.verification.cases.items()
+        }
+
+    def simulation_case(self, design, name, replicate):
+        """The case (plain JSON, SI) of one run of a design, None for the bare hopper.
+
+        Its seed follows from the study's seed, the run's name and replicate alone.
+        """
+        setup = self.without_insert() if design is None else self.with_design(design)
+        return checked_case(setup, design or {}, run_seed(self.seed, name, replicate))
+
+    def derived_params(self, name, replicate):
+        """What `derived_case` needs, beside the design that is found later, for one run (plain JSON)."""
+        centre = self.with_design(plans.centre(self.levels)).document
+        setup = {key: centre[key] for key in Setup.model_fields if key != "seed"}
+        used = ("shape", "height_mm", self.insert.shape)
+        setup["insert"] = {key: value for key, value in setup["insert"].items() if key in used}
+        setup["discharge"].pop("incomplete")
+        keys = {name: factor.key for name, factor in self.factors.items()}
+        return {"setup": setup, "keys": keys, "seed": run_seed(self.seed, name, replicate)}
+
+    def warnings(self):
+        """One sentence for each thing that is allowed but unusual."""
+        return checks.warnings(self)
+
+    def stage_params(self, stage):
+        """The settings of one stage as plain JSON values; KeyError for an unknown stage."""
+        return STAGES[stage](self)
+
+
+# Lists keep the order of factors and cases, which the sorted keys of a job's JSON would not.
+STAGES = {
+    "design": lambda study: {
+        "factors": list(study.factors),
+        "experiments": [experiment._asdict() for experiment in study.plan],
+    },
+    "gather": lambda study: {"factors": list(study.factors), "incomplete": study.discharge.incomplete},
+    "filter": lambda study: {
+        "factors": list(study.factors),
+        **study.surrogate.model_dump(
+            include={"clip_sigma", "split", "validation_experiments", "test_experiments", "seed"}
+        ),
+    },
+    "train": lambda study: study.surrogate.model_dump(
+        mode="json", include={"hidden_nodes", "starts", "selected_hidden_nodes", "seed"}
+    ),
+    "optimise": lambda study: {
+        **study.optimise.model_dump(exclude={"explicit"}),
+        "explicit": study.optimise.explicit if study.optimise.select == "explicit" else None,
+        "bounds": {name: list(plans.bounds(levels)) for name, levels in study.levels.items()},
+        "centre": plans.centre(study.levels),
+    },
+    "verify": lambda study: {"cases": list(study.cases()), "incomplete": study.discharge.incomplete},
+    "figures": lambda study: study.figures.model_dump(),
+}
+
+
+def run_seed(seed, name, replicate):
+    """Seed (48 bits) of one run, from the study's seed, the run's name and its replicate's number."""
+    digest = hashlib.sha256(json.dumps([seed, name, replicate]).encode()).digest()
+    return int.from_bytes(digest[:6], "big")
+
+
+def derived_case(params, design):
+    """The case of a design that the study found (see Study.derived_params); ConfigError if it is refused."""
+    setup = Setup.model_validate(params["setup"]).with_values(
+        {params["keys"][name]: value for name, value in design.items()}
+    )
+    return checked_case(setup, design, params["seed"])
+
+
+def checked_case(setup, labels, seed):
+    """The setup's case; raises ConfigError where it cannot be simulated."""
+    if refusals := checks.refusals(setup):
+        raise ConfigError("\n".join(refusals))
+    return setup.case(labels, seed)
+
+
+def parse(document, directory="."):
+    """The study of a raw document; relative paths in it are relative to `directory`.
+
+    Raises ConfigError with one line for each mistake: dotted key, value, and what is allowed.
+    """
+    if found := list(odd_keys(document)):
+        raise ConfigError("\n".join(found))
+    document = without_nulls(document, ("factors", "optimise.explicit", "verification.cases"))
+    study, found, faulty = _models(document)
+    if not {"insert", "design", "factors"} & faulty:
+        study, unread = _with_files(study, Path(directory))
+        found += unread
+        faulty |= {"insert", "design"} if unread else set()
+    found += checks.mistakes(study, faulty)
+    if found:
+        raise ConfigError("\n".join(found))
+    return study
+
+
+def _errors(error):
+    return error.errors(include_url=False)
+
+
+def _models(document):
+    """The study, the sentences for its mistakes, and the sections these spoil (there the defaults stand)."""
+    try:
+        return Study.model_validate(document), [], set()
+    except ValidationError as error:
+        errors = _errors(error)
+    spoilt = {str(item["loc"][0]) for item in errors if item["loc"]}
+    rest = {key: value for key, value in document.items() if key not in spoilt}
+    return Study.model_validate(rest), sentences(errors, Study), spoilt
+
+
+def _with_files(study, directory):
+    """The study with its CSV files read, and the sentences for those that cannot be used."""
+    found = []
+    if study.insert.shape == "profile" and study.insert.profile.file is not None:
+        try:
+            points = plans.points_from_csv(read_text(directory / study.insert.profile.file))
+            study = study.with_values({"insert.profile.points_mm": points, "insert.profile.file": None})
+        except NotAllowed as error:
+            found.append(mistake("insert.profile.file", study.insert.profile.file, error))
+    if study.design.plan == "csv":
+        try:
+            study._own_plan = plans.from_csv(read_text(directory / study.design.csv.file), study.levels)
+        except NotAllowed as error:
+            found.append(mistake("design.csv.file", study.design.csv.file, error))
+    return study, found

@@ -1,0 +1,160 @@
+"""Plans of experiments: which designs are simulated, under which names, and their table."""
+
+import csv
+import io
+import math
+import re
+from itertools import product
+from typing import NamedTuple
+
+from hopperopt.document import NotAllowed
+
+NAME = re.compile(r"[a-z][a-z0-9_]*")
+
+# Columns, dimensions and variables of the study's files, which no factor may be called.
+RESERVED = frozenset(
+    ["experiment", "replicate", "replicates", "size_class", "output", "case", "objective", "feasible", "selected", "status", "split", "target", "particle", "mass_fraction", "target_fraction", "counting_variance", "particle_count", "filling_level", "filling_time", "settled", "discharge_time", "discharge_time_s", "discharge_rate", "mass_flow_index", "max_overlap", "max_speed_ratio", "max_energy_gain", "lost_particles", "residual_count", "residual_mass_fraction", "step_count"]
+)
+)
+
+
+class Experiment(NamedTuple):
+    """One row of a plan: its name, factor values, and 1-based level numbers (empty without levels)."""
+
+    name: str
+    design: dict
+    levels: dict
+
+
+def l25(factors):
+    """The orthogonal array L25(5^6): `factors` maps up to six names to five levels each."""
+    from pydoe import get_orthogonal_array  # slow to import
+
+    array = get_orthogonal_array("L25(5^6)")[:, : len(factors)]
+    rows = [[int(index) for index in row] for row in array]
+    return [
+        Experiment(
+            name,
+            {factor: float(factors[factor][index]) for index, factor in zip(row, factors, strict=True)},
+            {factor: index + 1 for index, factor in zip(row, factors, strict=True)},
+        )
+        for name, row in zip(names(len(rows)), rows, strict=True)
+    ]
+
+
+def lhs(factors, experiments, seed):
+    """Latin hypercube within the ranges of the factors' levels."""
+    from scipy.stats import qmc  # slow to import
+
+    return _scaled(factors, qmc.LatinHypercube(len(factors), rng=seed).random(experiments))
+
+
+def sobol(factors, experiments, seed):
+    """Scrambled Sobol' points within the ranges of the factors' levels."""
+    from scipy.stats import qmc  # slow to import
+
+    return _scaled(factors, qmc.Sobol(len(factors), rng=seed).random(experiments))
+
+
+def _scaled(factors, unit):
+    """Experiments at points (n, factors) of the unit cube, to a millionth of each factor's range."""
+    designs = [
+        {factor: _between(*bounds(factors[factor]), share) for share, factor in zip(row, factors, strict=True)}
+        for row in unit
+    ]
+    return [Experiment(name, design, {}) for name, design in zip(names(len(designs)), designs, strict=True)]
+
+
+def _between(low, high, share):
+    decimals = 6 - math.floor(math.log10(high - low))
+    return min(max(round(low + (high - low) * float(share), decimals), low), high)
+
+
+def bounds(levels):
+    """Smallest and largest level of a factor."""
+    return float(min(levels)), float(max(levels))
+
+
+def centre(factors):
+    """The design at the middle level of each factor (mean of the two middle ones for an even number)."""
+    design = {}
+    for factor, levels in factors.items():
+        ordered = sorted(levels)
+        half = len(ordered) // 2
+        design[factor] = float(ordered[half] if len(ordered) % 2 else (ordered[half - 1] + ordered[half]) / 2)
+    return design
+
+
+def corners(factors):
+    """Every combination of the factors' smallest and largest levels."""
+    return [dict(zip(factors, values, strict=True)) for values in product(*map(bounds, factors.values()))]
+
+
+def names(count):
+    """exp_01, exp_02, ..., exp_99, exp_100: never padded anew, whatever the count."""
+    return [f"exp_{number:02d}" for number in range(1, count + 1)]
+
+
+def from_csv(text, factors):
+    """An own plan: a column `experiment` and one for each factor.
+
+    Raises NotAllowed with what the file should hold.
+    """
+    rows = list(csv.DictReader(io.StringIO(text), skipinitialspace=True))
+    columns = ["experiment", *factors]
+    found = set(rows[0]) if rows else set()
+    missing = [column for column in columns if column not in found]
+    if missing:
+        raise NotAllowed(f"a CSV file with the columns {', '.join(columns)} and at least one row")
+    experiments = [_from_row(number, row, factors) for number, row in enumerate(rows, start=2)]
+    seen = [experiment.name for experiment in experiments]
+    for name in seen:
+        if seen.count(name) > 1:
+            raise NotAllowed(f"a name for each experiment ({name} is there twice)")
+    return experiments
+
+
+def _from_row(number, row, factors):
+    name = (row["experiment"] or "").strip()
+    if not NAME.fullmatch(name):
+        raise NotAllowed(f"names of small letters, digits and underscores (line {number} has {name!r})")
+    design = {}
+    for factor in factors:
+        try:
+            design[factor] = float(row[factor])
+        except (TypeError, ValueError):
+            design[factor] = math.nan
+        if not math.isfinite(design[factor]):
+            raise NotAllowed(f"a number in every column (line {number} has {factor} {row[factor]!r})")
+    return Experiment(name, design, {})
+
+
+def points_from_csv(text):
+    """Points (r, z) of a profile, from a CSV file with the columns r_mm and z_mm; raises NotAllowed."""
+    rows = list(csv.DictReader(io.StringIO(text), skipinitialspace=True))
+    try:
+        points = [[float(row["r_mm"]), float(row["z_mm"])] for row in rows]
+    except (KeyError, TypeError, ValueError):
+        points = []
+    if len(points) < 2 or not all(map(math.isfinite, [number for point in points for number in point])):
+        raise NotAllowed("a CSV file with the columns r_mm, z_mm and numbers in at least two rows")
+    return points
+
+
+def write_table(params, output):
+    """Write design.csv: experiment, a column for each factor, a column of level numbers for each factor.
+
+    params: `factors`, their names in order; `experiments`, dicts of `name`, `design` and `levels` (1-based
+    numbers; empty without levels, as are their columns then).
+    """
+    import pandas as pd
+
+    from hopperopt import files
+
+    rows = [
+        {"experiment": row["name"]}
+        | {factor: row["design"][factor] for factor in params["factors"]}
+        | {f"{factor}_level": row["levels"].get(factor) for factor in params["factors"]}
+        for row in params["experiments"]
+    ]
+    files.write_table(pd.DataFrame(rows), output)
