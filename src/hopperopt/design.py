@@ -12,10 +12,15 @@ from hopperopt.document import NotAllowed
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 # Columns, dimensions and variables of the study's files, which no factor may be called.
-RESERVED = frozenset(
-    ["experiment", "replicate", "replicates", "size_class", "output", "case", "objective", "feasible", "selected", "status", "split", "target", "particle", "mass_fraction", "target_fraction", "counting_variance", "particle_count", "filling_level", "filling_time", "settled", "discharge_time", "discharge_time_s", "discharge_rate", "mass_flow_index", "max_overlap", "max_speed_ratio", "max_energy_gain", "lost_particles", "residual_count", "residual_mass_fraction", "step_count"]
-)
-)
+# fmt: off
+RESERVED = {
+    "experiment", "replicate", "replicates", "size_class", "output", "case", "objective", "feasible", "selected",
+    "status", "split", "target", "particle", "mass_fraction", "target_fraction", "counting_variance",
+    "particle_count", "filling_level", "filling_time", "settled", "discharge_time", "discharge_time_s",
+    "discharge_rate", "mass_flow_index", "max_overlap", "max_speed_ratio", "max_energy_gain", "lost_particles",
+    "residual_count", "residual_mass_fraction", "step_count",
+}
+# fmt: on
 
 
 class Experiment(NamedTuple):
@@ -58,8 +63,12 @@ def sobol(factors, experiments, seed):
 
 def _scaled(factors, unit):
     """Experiments at points (n, factors) of the unit cube, to a millionth of each factor's range."""
+    ranges = {factor: bounds(levels) for factor, levels in factors.items()}
     designs = [
-        {factor: _between(*bounds(factors[factor]), share) for share, factor in zip(row, factors, strict=True)}
+        {
+            factor: _between(*limits, share)
+            for (factor, limits), share in zip(ranges.items(), row, strict=True)
+        }
         for row in unit
     ]
     return [Experiment(name, design, {}) for name, design in zip(names(len(designs)), designs, strict=True)]
