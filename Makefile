@@ -5,16 +5,10 @@
 # make PYTHON=python3.12   another Python for the environment;   make CORES=4   fewer cores for the study
 
 CORES ?= all
-ifdef PYTHON
-wanted := $(shell $(PYTHON) -c 'import sys; print(sys.version)' 2>/dev/null)
-else
-PYTHON = $(shell for p in python3.11 python3.12 python3.13 python3.14 python3; do \
-	$$p -c '$(suitable)' 2>/dev/null && echo $$p && break; done)
-wanted := $(shell .venv/bin/python -c 'import sys; print(sys.version)' 2>/dev/null)
-endif
-suitable := import ensurepip, sys, venv; sys.exit(sys.implementation.name != "cpython" or not (3, 11) <= sys.version_info < (3, 15))
 stamp := .venv/complete
-install := .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation
+install := .venv/bin/python -m pip install -qq --disable-pip-version-check --no-deps --no-build-isolation
+suitable := import ensurepip, sys, venv; sys.exit(sys.implementation.name != "cpython" or not (3, 11) <= sys.version_info < (3, 15))
+version = $(shell $(1) -c 'import sys; print(sys.version)' 2>/dev/null)
 
 .PHONY: study setup test lint lock
 study: setup
@@ -29,9 +23,14 @@ lint: setup
 	.venv/bin/ruff check .
 	.venv/bin/lint-imports
 
-# A Python named on the command line that is not the environment's makes it anew; without a name it stays.
-ifneq ($(wanted),$(shell .venv/bin/python -c 'import sys; print(sys.version)' 2>/dev/null))
+# A Python that is named and is not the environment's makes it anew; without a name the environment stays.
+ifdef PYTHON
+ifneq ($(call version,$(PYTHON)),$(call version,.venv/bin/python))
 .PHONY: $(stamp)
+endif
+else
+PYTHON = $(shell for p in python3.11 python3.12 python3.13 python3.14 python3; do \
+	$$p -c '$(suitable)' 2>/dev/null && echo $$p && break; done)
 endif
 
 # The stamp comes last: an environment without it is half made and is made anew from nothing.
