@@ -1,1 +1,1 @@
-"""Optimisation of a hopper insert against size segregation: simulation, surrogate, optimiser, verification."""
+"""Optimisation of a hopper insert against segregation: simulation, surrogate, optimiser, verification."""
