@@ -5,6 +5,7 @@ Works on the models' attributes alone. A refusal or warning about designs is sai
 
 import difflib
 import re
+from contextlib import suppress
 from typing import NamedTuple
 
 from hopperopt import design as plans
@@ -203,8 +204,11 @@ def _factor_levels(study, place, factor):
     except ConfigError as error:
         yield f"{place}.levels: {error}"
         return
-    low, high = (setup.case({}, 0) for setup in setups[:2])
-    if low == high:
+    cases = []
+    for setup in setups:
+        with suppress(ConfigError):  # what is wrong with a design is said of the plan's designs
+            cases.append(setup.case({}, 0))
+    if len(cases) > 1 and all(case == cases[0] for case in cases):
         yield mistake(f"{place}.key", factor.key, "a number that makes a difference (this one makes none)")
 
 

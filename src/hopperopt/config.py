@@ -23,6 +23,7 @@ from pydantic import (
 )
 from pydantic_core import core_schema
 
+from hopperopt import case as cases
 from hopperopt import checks, geometry
 from hopperopt import design as plans
 from hopperopt.document import (
@@ -41,8 +42,7 @@ from hopperopt.quantity import Quantity
 __all__ = ["ConfigError", "Setup", "Study", "derived_case", "load", "parse"]
 
 MM = 1000.0  # millimetres in a metre; dividing by it rounds once, so that 22.5 mm is 0.0225 m
-CLEARANCE = 0.005  # m between the column of falling particles and what is below it
-HEADROOM = 0.020  # m of wall above the column
+CLEARANCE = 0.005  # m between what is below and the column of falling particles
 RAYLEIGH_SHARE = 0.2  # of `time_step_s: auto`
 
 
@@ -63,7 +63,7 @@ class Number(Quantity):
 Positive = Annotated[float, Number(above=0)]
 NotNegative = Annotated[float, Number(least=0)]
 Share = Annotated[float, Number(least=0, most=1)]
-Any = Annotated[float, Number()]
+Finite = Annotated[float, Number()]
 Count = Annotated[int, Number(least=1)]
 Seed = Annotated[int, Number(least=0)]
 Poisson = Annotated[float, Number(least=0, most=0.5)]
@@ -112,7 +112,7 @@ class Profile(Model):
     """A body of one's own: points r, z (z from the insert's height), in a CSV file or typed in."""
 
     file: Annotated[str, StringConstraints(min_length=1)] | None = None
-    points_mm: tuple[tuple[Any, Any], ...] | None = None
+    points_mm: tuple[tuple[Finite, Finite], ...] | None = None
 
     def profile(self):
         """Profile above the insert's height (m)."""
@@ -290,54 +290,17 @@ class Setup(Model):
         return float(f"{RAYLEIGH_SHARE * self.particles.rayleigh_time:.6g}") if step == "auto" else step
 
     def case(self, labels, seed):
-        """One simulation as plain JSON values in SI; `labels` are the design's factor values as typed."""
-        filling, discharge, spheres = self.filling, self.discharge, self.particles
-        count, coarse_radius = self.particle_count, spheres.diameters[2] / 2
-        column_radius = self.hopper.cylinder_radius_mm / MM - coarse_radius
-        sphere_volume = math.pi / 6 * sum(diameter**3 for diameter in spheres.diameters) / 3
-        column = count * sphere_volume / (filling.column_solid_fraction * math.pi * column_radius**2)
-        hopper = self.hopper.profile(self.column_bottom + column + HEADROOM)
-        return {
-            "walls": {
-                "hopper": hopper.tolist(),
-                "gate": geometry.gate(self.hopper.outlet_radius_mm / MM).tolist(),
-                "insert": None if self.insert_profile is None else self.insert_profile.tolist(),
-            },
-            "particles": {
-                "diameters": spheres.diameters,
-                "counts": [count // 3] * 3,
-                "density": spheres.density_kg_m3,
-                "shear_modulus": spheres.shear_modulus_pa,
-                "poisson_ratio": spheres.poisson_ratio,
-            },
-            "wall": {"shear_modulus": self.wall.shear_modulus_pa, "poisson_ratio": self.wall.poisson_ratio},
-            "contact": self.contact.model_dump(),
-            "filling": {
-                "level": filling.level_mm / MM,
-                "column_radius": round(column_radius, geometry.DECIMALS),
-                "column_bottom": round(float(self.column_bottom), geometry.DECIMALS),
-                "solid_fraction": filling.column_solid_fraction,
-                "speed": filling.speed_m_s,
-                "speed_scatter": filling.speed_scatter_m_s,
-                "settling_limit": filling.settling_limit_s,
-            },
-            "discharge": {
-                "sensor": discharge.sensor_mm / MM,
-                "idle_limit": discharge.idle_limit_s,
-                "time_limit": discharge.time_limit_s,
-            },
-            "time_step": self.time_step,
-            "gravity": self.simulation.gravity_m_s2,
-            "seed": seed,
-            "design": {name: float(value) for name, value in labels.items()},
-        }
+        """One simulation as plain JSON values in SI; ConfigError where it cannot be simulated."""
+        if refusals := checks.refusals(self):
+            raise ConfigError("\n".join(refusals))
+        return cases.simulation(self, labels, seed)
 
 
 class Factor(Model):
     """A number of the configuration that the designs vary, and its levels."""
 
     key: str
-    levels: Annotated[tuple[Any, ...], Field(min_length=2)]
+    levels: Annotated[tuple[Finite, ...], Field(min_length=2)]
 
 
 def _power_of_two(count):
@@ -398,7 +361,7 @@ class Optimise(Model):
     mutation_probability: Share = 0.1
     seed: Seed = 1
     select: Literal["knee", "compromise", "explicit"] = "knee"
-    explicit: dict[Name, Any] = {}
+    explicit: dict[Name, Finite] = {}
 
 
 FIXED = ("plan_centre", "bare")
@@ -507,7 +470,7 @@ class Study(Setup):
         Its seed follows from the study's seed, the run's name and replicate alone.
         """
         setup = self.without_insert() if design is None else self.with_design(design)
-        return checked_case(setup, design or {}, run_seed(self.seed, name, replicate))
+        return setup.case(design or {}, run_seed(self.seed, name, replicate))
 
     def derived_params(self, name, replicate):
         """What `derived_case` needs, beside the design that is found later, for one run (plain JSON)."""
@@ -566,14 +529,7 @@ def derived_case(params, design):
     setup = Setup.model_validate(params["setup"]).with_values(
         {params["keys"][name]: value for name, value in design.items()}
     )
-    return checked_case(setup, design, params["seed"])
-
-
-def checked_case(setup, labels, seed):
-    """The setup's case; raises ConfigError where it cannot be simulated."""
-    if refusals := checks.refusals(setup):
-        raise ConfigError("\n".join(refusals))
-    return setup.case(labels, seed)
+    return setup.case(design, params["seed"])
 
 
 def parse(document, directory="."):

@@ -14,11 +14,11 @@ NAME = re.compile(r"[a-z][a-z0-9_]*")
 # Columns, dimensions and variables of the study's files, which no factor may be called.
 # fmt: off
 RESERVED = {
-    "experiment", "replicate", "replicates", "size_class", "output", "case", "objective", "feasible", "selected",
-    "status", "split", "target", "particle", "mass_fraction", "target_fraction", "counting_variance",
-    "particle_count", "filling_level", "filling_time", "settled", "discharge_time", "discharge_time_s",
-    "discharge_rate", "mass_flow_index", "max_overlap", "max_speed_ratio", "max_energy_gain", "lost_particles",
-    "residual_count", "residual_mass_fraction", "step_count",
+    "experiment", "replicate", "replicates", "size_class", "output", "case", "objective", "feasible",
+    "selected", "status", "split", "target", "particle", "mass_fraction", "target_fraction",
+    "counting_variance", "particle_count", "filling_level", "filling_time", "settled", "discharge_time",
+    "discharge_time_s", "discharge_rate", "mass_flow_index", "max_overlap", "max_speed_ratio",
+    "max_energy_gain", "lost_particles", "residual_count", "residual_mass_fraction", "step_count",
 }
 # fmt: on
 

@@ -8,8 +8,14 @@ from hopperopt.document import NotAllowed, mistake, shown
 
 
 def sentences(errors, model):
-    """One sentence for each of pydantic's error dicts; `model` is the class of the whole document."""
-    return list(dict.fromkeys(_sentence(error, model) for error in errors))
+    """One sentence for each of pydantic's error dicts; `model` is the class of the whole document.
+
+    A key that is missing because it is misspelt is said once, as the unknown key.
+    """
+    unknown = [error["loc"] for error in errors if error["type"] == "extra_forbidden"]
+    misspelt = {(*path[:-1], name) for path in unknown for name in _nearest(path, model)}
+    told = [error for error in errors if error["type"] != "missing" or error["loc"] not in misspelt]
+    return [_sentence(error, model) for error in told]
 
 
 def _sentence(error, model):
@@ -29,7 +35,7 @@ def _sentence(error, model):
 def _unknown(key, value, model, path):
     """An unknown key: the nearest of the keys beside it, or of all keys, and what stands there."""
     known = list(_fields(_annotation(model, path[:-1])))
-    near = difflib.get_close_matches(str(path[-1]), known, n=1)
+    near = _nearest(path, model)
     if not near:
         everywhere = {name.rpartition(".")[2]: name for name in _all_keys(model)}
         near = [
@@ -37,6 +43,12 @@ def _unknown(key, value, model, path):
         ]
     hint = f"did you mean {near[0]}? " if near else ""
     return f"{key}: unknown key (with {shown(value)}); {hint}allowed: {', '.join(known)}"
+
+
+def _nearest(path, model):
+    """The known key beside an unknown one that looks most like it, in a list; empty when none does."""
+    known = list(_fields(_annotation(model, path[:-1])))
+    return difflib.get_close_matches(str(path[-1]), known, n=1)
 
 
 def _allowed(error, annotation):

@@ -1,0 +1,68 @@
+"""The case of one simulation: all that the solver is told, as plain JSON values in SI."""
+
+import math
+
+from hopperopt import geometry
+
+MM = 1000.0
+HEADROOM = 0.020  # m of wall above the column of falling particles
+
+
+def simulation(setup, labels, seed):
+    """Case of a setup (its models in mm and degrees); `labels` are the design's factor values as typed."""
+    insert, spheres = setup.insert_profile, setup.particles
+    return {
+        "walls": {
+            "hopper": setup.hopper.profile(_column_top(setup) + HEADROOM).tolist(),
+            "gate": geometry.gate(setup.hopper.outlet_radius_mm / MM).tolist(),
+            "insert": None if insert is None else insert.tolist(),
+        },
+        "particles": {
+            "diameters": spheres.diameters,
+            "counts": [setup.particle_count // 3] * 3,
+            "density": spheres.density_kg_m3,
+            "shear_modulus": spheres.shear_modulus_pa,
+            "poisson_ratio": spheres.poisson_ratio,
+        },
+        "wall": {
+            "shear_modulus": setup.wall.shear_modulus_pa,
+            "poisson_ratio": setup.wall.poisson_ratio,
+        },
+        "contact": setup.contact.model_dump(),
+        "filling": _filling(setup),
+        "discharge": {
+            "sensor": setup.discharge.sensor_mm / MM,
+            "idle_limit": setup.discharge.idle_limit_s,
+            "time_limit": setup.discharge.time_limit_s,
+        },
+        "time_step": setup.time_step,
+        "gravity": setup.simulation.gravity_m_s2,
+        "seed": seed,
+        "design": {name: float(value) for name, value in labels.items()},
+    }
+
+
+def _filling(setup):
+    filling = setup.filling
+    return {
+        "level": filling.level_mm / MM,
+        "column_radius": round(_column_radius(setup), geometry.DECIMALS),
+        "column_bottom": round(float(setup.column_bottom), geometry.DECIMALS),
+        "solid_fraction": filling.column_solid_fraction,
+        "speed": filling.speed_m_s,
+        "speed_scatter": filling.speed_scatter_m_s,
+        "settling_limit": filling.settling_limit_s,
+    }
+
+
+def _column_radius(setup):
+    """Radius within which the centres of the falling particles lie: a coarse radius clear of the wall."""
+    return setup.hopper.cylinder_radius_mm / MM - setup.particles.diameters[-1] / 2
+
+
+def _column_top(setup):
+    """Height of the column that the particles fill at the column's solid fraction."""
+    sphere = math.pi / 6 * sum(diameter**3 for diameter in setup.particles.diameters) / 3
+    section = math.pi * _column_radius(setup) ** 2
+    volume = setup.particle_count * sphere / setup.filling.column_solid_fraction
+    return setup.column_bottom + volume / section
