@@ -1,8 +1,8 @@
 """Forces of all contacts, in blocks: gather, one vector loop over the law, scatter.
 
 A block is one flat buffer of rows (quantities) by lanes (contacts), indexed `row * STRIDE + lane`: one array
-needs no alias checks, so the compiler turns the law's loop into vector instructions. Pairs and walls differ only in
-how they fill the rows and where they add the result.
+needs no alias checks, so the compiler turns the law's loop into vector instructions. Pairs and walls differ
+only in how they fill the rows and where they add the result.
 """
 
 import math
@@ -72,7 +72,8 @@ def apply_law(block, lanes, law, dt):
 
 @njit(error_model="numpy")
 def roll_cdt(block, lanes, law):
-    """Rolling torques of the `cdt` model; ARM_I must not matter: the arm is R* for pairs and l_i for walls."""
+    """Rolling torques of the `cdt` model; ARM_I must not matter: the arm is R* for pairs and l_i for
+    walls."""
     for q in range(lanes):
         n = (block[NX * STRIDE + q], block[NY * STRIDE + q], block[NZ * STRIDE + q])
         w = (block[WX * STRIDE + q], block[WY * STRIDE + q], block[WZ * STRIDE + q])

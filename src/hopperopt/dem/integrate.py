@@ -20,9 +20,9 @@ def clear_forces(spheres, count):
 def kick_and_drift(spheres, counters, monitors, settings):
     """Advance velocities and spins by one step's forces, brake the spins, then move the spheres.
 
-    Marks the lists stale when a sphere has left its skin (or is no longer a number). Notes the largest squared
-    ratio of speed to the fall speed sqrt(v0^2 + 2 g (highest start - z)). Returns how many spheres have just
-    passed the sensor.
+    Marks the lists stale when a sphere has left its skin (or is no longer a number). Notes the largest
+    squared ratio of speed to the fall speed sqrt(v0^2 + 2 g (highest start - z)). Returns how many spheres
+    have just passed the sensor.
     """
     dt, g = settings.time_step, settings.gravity
     weight = math.sqrt(g[0] ** 2 + g[1] ** 2 + g[2] ** 2)

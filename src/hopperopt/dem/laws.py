@@ -1,11 +1,11 @@
 """The contact law: Hertz-Mindlin with centred dashpots, Coulomb's limit and rolling friction.
 
 Symbols: delta overlap, n unit normal towards the sphere, v velocity of the sphere's surface relative to the
-other body at the contact, xi tangential spring, R and m the pair's effective radius and mass (1/R = 1/R_i + 1/R_j,
-1/m = 1/m_i + 1/m_j; a wall leaves the sphere's own), E and G the effective moduli.
+other body at the contact, xi tangential spring, R and m the pair's effective radius and mass (1/R = 1/R_i +
+1/R_j, 1/m = 1/m_i + 1/m_j; a wall leaves the sphere's own), E and G the effective moduli.
 
-Both dashpots are centred: the velocity at hand is that of the half step before, and dividing by 1 + c makes the
-force that of the mean of the old and the new velocity, to second order for an isolated contact.
+Both dashpots are centred: the velocity at hand is that of the half step before, and dividing by 1 + c makes
+the force that of the mean of the old and the new velocity, to second order for an isolated contact.
 """
 
 import math
@@ -24,9 +24,11 @@ def hertz_mindlin(delta, n, v, xi, radius, mass, law, dt):
     tangential force, 3-tuple, N; xi, 3-tuple, m).
 
     - normal: (F_el - gamma_n v_n) / (1 + c_n), F_el = 4/3 E sqrt(R) delta^1.5, S_n = 2 E sqrt(R delta),
-      gamma_n = 2 sqrt(5/6) beta sqrt(S_n m), c_n = gamma_n dt / (2 m). It may pull: the contact ends at delta = 0.
+      gamma_n = 2 sqrt(5/6) beta sqrt(S_n m), c_n = gamma_n dt / (2 m). It may pull: the contact ends at delta
+      = 0.
     - load N = F_el / (1 + c_n): what a contact held by its neighbours transmits at rest.
-    - tangential: -(S_t xi + gamma_t v_t) / (1 + c_t), S_t = 8 G sqrt(R delta), c_t = gamma_t dt / (2 * 2/7 m).
+    - tangential: -(S_t xi + gamma_t v_t) / (1 + c_t), S_t = 8 G sqrt(R delta), c_t = gamma_t dt / (2 * 2/7
+      m).
     - Coulomb: |xi| <= (1 + c_t) mu N / S_t and the tangential force <= mu N.
     """
     a = math.sqrt(radius * delta)
@@ -70,7 +72,8 @@ def elastic_energy(delta, xi, radius, law):
 
 @njit(error_model="numpy")
 def directional_torque(n, w, torque):
-    """Rolling torque of the `cdt` model: `torque` (N m) against the relative spin w, without its part along n.
+    """Rolling torque of the `cdt` model: `torque` (N m) against the relative spin w, without its part along
+    n.
 
     Ai, Chen, Rotter, Ooi, Powder Technology 206 (2011) 269, model A, as LIGGGHTS applies it.
     """

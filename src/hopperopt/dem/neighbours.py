@@ -68,7 +68,8 @@ def grow_skins(spheres, count, settings):
 
 @njit
 def make_grid(spheres, count, reach):
-    """Cells of at least `reach` (m) around the spheres. Returns (corner (3,), cell size, cells along x, y, z)."""
+    """Cells of at least `reach` (m) around the spheres. Returns (corner (3,), cell size, cells along x, y,
+    z)."""
     low = np.full(3, np.inf)
     high = np.full(3, -np.inf)
     for i in range(count):

@@ -30,7 +30,8 @@ def motion_energies(spheres, counters, settings):
 
 @njit(error_model="numpy")
 def spring_energy(spheres, pairs, touches, walls, counters, settings):
-    """Elastic energy of all contacts with the springs of the last step, J, half a step back like the motion."""
+    """Elastic energy of all contacts with the springs of the last step, J, half a step back like the
+    motion."""
     total = 0.0
     half = 0.5 * settings.time_step
     for i in range(counters[COUNT]):

@@ -37,9 +37,10 @@ class NotFinite(ArithmeticError):
 class Simulation:
     """Spheres, walls and laws, advanced step by step.
 
-    Arguments: `position`, `velocity`, `spin` (n, 3) in m, m/s, rad/s; `radius` (n,) m; `density` kg/m3; `walls`, a
-    dict of name -> (points, 2) revolved profile in m; `pair_law` and `wall_law` from `materials.contact_law`;
-    `time_step` s; `gravity` m/s2, downward or a (3,) vector; `rolling` "edem", "cdt" or "none".
+    Arguments: `position`, `velocity`, `spin` (n, 3) in m, m/s, rad/s; `radius` (n,) m; `density` kg/m3;
+    `walls`, a dict of name -> (points, 2) revolved profile in m; `pair_law` and `wall_law` from
+    `materials.contact_law`; `time_step` s; `gravity` m/s2, downward or a (3,) vector; `rolling` "edem", "cdt"
+    or "none".
     """
 
     def __init__(
@@ -159,7 +160,14 @@ def compile_solver():
     from hopperopt.dem.state import Law
 
     simulation = Simulation(
-        [[0.0, 0.0, 0.0009]], np.zeros((1, 3)), [0.001], 1000.0, {"floor": [[0, 0], [1, 0]]}, Law(*law), Law(*law), 1e-6
+        [[0.0, 0.0, 0.0009]],
+        np.zeros((1, 3)),
+        [0.001],
+        1000.0,
+        {"floor": [[0, 0], [1, 0]]},
+        Law(*law),
+        Law(*law),
+        1e-6,
     )
     simulation.advance(1)
     simulation.energy()

@@ -1,13 +1,14 @@
 """Walls of revolution: profiles in the meridian plane, their elements, and the spheres near them.
 
-The closest point of an axisymmetric wall lies in the sphere's own meridian plane, so a wall contact is a point
-against a polyline: exact, without facets. Elements are segments and vertices. A vertex is the closest point
-only where the sphere lies beyond the end of every segment that meets there, so a convex edge gives one
+The closest point of an axisymmetric wall lies in the sphere's own meridian plane, so a wall contact is a
+point against a polyline: exact, without facets. Elements are segments and vertices. A vertex is the closest
+point only where the sphere lies beyond the end of every segment that meets there, so a convex edge gives one
 contact and a concave corner two. Segments that meet at less than 15 degrees form one surface, and a sphere
 has one contact with a surface, with its deepest element; the spring belongs to the surface.
 """
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -40,14 +41,14 @@ class Walls(NamedTuple):
 def make_walls(profiles):
     """Elements of revolved polylines.
 
-    Arguments: `profiles`, a list of (points, 2) arrays of r >= 0 and z in m. Points shared by two profiles or by
-    the two ends of one profile are joints like any other. Raises ValueError where more than two segments
+    Arguments: `profiles`, a list of (points, 2) arrays of r >= 0 and z in m. Points shared by two profiles or
+    by the two ends of one profile are joints like any other. Raises ValueError where more than two segments
     meet in a point or a segment has no length.
     """
     segments, owners = [], []
     for wall, points in enumerate(profiles):
         points = np.asarray(points, dtype=float)
-        for a, b in zip(points[:-1], points[1:], strict=True):
+        for a, b in pairwise(points):
             if not np.linalg.norm(b - a) > 0.0:
                 raise ValueError(f"wall {wall}: two equal points at r, z = {tuple(a)}")
             segments.append((a, b))
@@ -165,7 +166,8 @@ def open_wall(walls, touches, entries, profile):
 def nearest(walls, e, r, z):
     """Vector (r, z) in m from the closest point of element e to a sphere centre, and whether e is it.
 
-    A segment answers where the centre projects onto it, a vertex where it projects beyond every segment there.
+    A segment answers where the centre projects onto it, a vertex where it projects beyond every segment
+    there.
     """
     dr, dz = r - walls.point[e, 0], z - walls.point[e, 1]
     if walls.length2[e] > 0.0:

@@ -1,0 +1,113 @@
+"""What is watched while a simulation runs: energy, spheres outside the walls, the flow pattern."""
+
+from itertools import pairwise
+
+import numpy as np
+
+MIN_SPHERES = 20  # fewer per sample in either region, and the mass-flow index is not told
+FLOW_BAND = (0.030, 0.060)  # m above the outlet
+FLOW_SHARE = (0.05, 0.35)  # of the mass discharged
+LEVEL_RINGS = 10
+
+
+class EnergyWatch:
+    """Largest gain of mechanical energy over an earlier sample, relative to the potential energy released."""
+
+    def __init__(self, energies):
+        kinetic, self._potential, elastic = energies
+        self._least = kinetic + self._potential + elastic
+        self.gain = 0.0
+
+    def sample(self, energies):
+        """Take the (kinetic, gravitational, elastic) energies of a sample, J."""
+        kinetic, potential, elastic = energies
+        total = kinetic + potential + elastic
+        released = self._potential - potential
+        if total > self._least and released > 0.0:
+            self.gain = max(self.gain, (total - self._least) / released)
+        self._least = min(self._least, total)
+
+
+class Envelope:
+    """The hopper's inside: counts the spheres whose centre was ever seen outside it."""
+
+    def __init__(self, profile, count):
+        self._r, self._z = np.asarray(profile, dtype=float).T
+        self._outside = np.zeros(count, dtype=bool)
+
+    def sample(self, position, gate_closed):
+        """Look at positions (n, 3) by identity, m; NaN rows (spheres that left) are passed over.
+
+        Below the outlet there is no wall, so a sphere there is outside only while the gate is closed.
+        """
+        r, z = np.hypot(position[:, 0], position[:, 1]), position[:, 2]
+        beside = (r > np.interp(z, self._z, self._r)) & (z >= self._z[0])
+        below = (z < self._z[0]) if gate_closed else False
+        self._outside |= beside | (z > self._z[-1]) | below
+
+    @property
+    def lost(self):
+        """Spheres seen outside so far."""
+        return int(np.count_nonzero(self._outside))
+
+
+def radius_at(profile, z):
+    """Outer radius (m) of a closed revolved profile at heights z (n,), 0 where it is not; profile may be
+    None."""
+    outer = np.zeros(len(z))
+    for (r1, z1), (r2, z2) in pairwise(profile or ()):
+        low, high = min(z1, z2), max(z1, z2)
+        share = (z - z1) / (z2 - z1) if z2 != z1 else np.zeros(len(z))
+        inside = (z >= low) & (z <= high)
+        outer = np.where(inside, np.maximum(outer, r1 + share * (r2 - r1)), outer)
+    return outer
+
+
+class FlowPattern:
+    """Mass-flow index: mean downward speed at the cylinder wall over that at the axis.
+
+    The wall's region is one coarse diameter wide; the axis' region reaches two coarse diameters from the
+    axis, or from the insert where that occupies the axis. Averaged over the samples taken.
+    """
+
+    def __init__(self, case):
+        self._coarse = case["particles"]["diameters"][-1]
+        self._insert = case["walls"]["insert"]
+        self._wall_radius = case["walls"]["hopper"][-1][0]
+        self._sums, self._counts, self._samples = np.zeros(2), np.zeros(2), 0
+
+    def sample(self, position, velocity, share):
+        """Take positions and velocities (n, 3) at a discharged mass fraction; NaN rows are passed over."""
+        if not FLOW_SHARE[0] <= share <= FLOW_SHARE[1]:
+            return
+        inside = (position[:, 2] >= FLOW_BAND[0]) & (position[:, 2] <= FLOW_BAND[1])
+        x, y, z = position[inside].T
+        r, down = np.hypot(x, y), -velocity[inside, 2]
+        near_wall = r > self._wall_radius - self._coarse
+        near_axis = r - radius_at(self._insert, z) < 2.0 * self._coarse
+        for k, region in enumerate((near_wall, near_axis)):
+            self._sums[k] += down[region].sum()
+            self._counts[k] += np.count_nonzero(region)
+        self._samples += 1
+
+    @property
+    def index(self):
+        """The index; NaN with fewer than 20 spheres per sample in either region."""
+        if not self._samples or self._counts.min() < MIN_SPHERES * self._samples:
+            return np.nan
+        wall, axis = self._sums / self._counts
+        return float(wall / axis) if axis else np.nan
+
+
+def filling_level(position, radius, case):
+    """Height of the bed's top, m: mean over ten rings of equal area of the highest sphere top.
+
+    Rings that the insert covers at the level asked for are left out, as are empty ones.
+    """
+    cylinder = case["walls"]["hopper"][-1][0]
+    covered = radius_at(case["walls"]["insert"], np.array([case["filling"]["level"]]))[0]
+    edges = cylinder * np.sqrt(np.arange(LEVEL_RINGS + 1) / LEVEL_RINGS)
+    ring = np.searchsorted(edges, np.hypot(position[:, 0], position[:, 1]), side="right") - 1
+    tops = position[:, 2] + radius
+    heights = [tops[ring == k].max() for k in range(LEVEL_RINGS) if edges[k] >= covered and np.any(ring == k)]
+    return float(np.mean(heights)) if heights else np.nan
