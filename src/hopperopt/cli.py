@@ -53,7 +53,15 @@ STAGES = {
     ),
 }
 SIMULATION = "experiment"
-FIGURES = "figures"
+# Options of each figure's inputs; a figure is drawn by the module `figures.NAME`.
+FIGURES = {
+    "hopper": ("run",),
+    "curves": ("dataset",),
+    "fit": ("training", "network"),
+    "verification": ("simulations*", "network"),
+    "front": ("front",),
+    "errors": ("errors",),
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -90,20 +98,22 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_simulate(commands.add_parser("simulate", help="run one simulation"))
     for name, stage in STAGES.items():
-        command = commands.add_parser(name, help=stage.help)
-        command.add_argument("--params", type=_json, required=True, metavar="JSON", help="configuration")
-        for option in stage.inputs:
-            count = {"nargs": "+"} if option.endswith("*") else {}
-            command.add_argument(f"--{option.rstrip('*')}", required=True, metavar="FILE", **count)
-        command.add_argument("--output", required=True, nargs=len(stage.outputs), metavar=stage.outputs)
-        command.set_defaults(run=_run_stage, stage=stage)
+        _add_stage(commands.add_parser(name, help=stage.help), stage)
     figure = commands.add_parser("figure", help="draw one figure")
-    figure.add_argument("name")
-    figure.add_argument("--params", type=_json, required=True, metavar="JSON", help="configuration")
-    figure.add_argument("--input", nargs="+", required=True, metavar="FILE")
-    figure.add_argument("--output", nargs="+", required=True, metavar="FILE", help="PNG, PDF")
-    figure.set_defaults(run=_draw_figure)
+    names = figure.add_subparsers(metavar="NAME", required=True)
+    for name, inputs in FIGURES.items():
+        stage = Stage(f"figures.{name}", "write", inputs, ("NAME.png", "NAME.pdf"), f"draw {name}")
+        _add_stage(names.add_parser(name, help=stage.help), stage)
     return parser
+
+
+def _add_stage(command: argparse.ArgumentParser, stage: Stage) -> None:
+    command.add_argument("--params", type=_json, required=True, metavar="JSON", help="configuration")
+    for option in stage.inputs:
+        count = {"nargs": "+"} if option.endswith("*") else {}
+        command.add_argument(f"--{option.rstrip('*')}", required=True, metavar="FILE", **count)
+    command.add_argument("--output", required=True, nargs=len(stage.outputs), metavar=stage.outputs)
+    command.set_defaults(run=_run_stage, stage=stage)
 
 
 def _json(text: str) -> dict:
@@ -118,12 +128,9 @@ def _run_stage(given: argparse.Namespace) -> None:
     inputs = [getattr(given, option.rstrip("*")) for option in given.stage.inputs]
     module = importlib.import_module(f"hopperopt.{given.stage.module}")
     _stamp_files()
-    getattr(module, given.stage.function)(given.params, *inputs, *given.output)
-
-
-def _draw_figure(given: argparse.Namespace) -> None:
-    module = importlib.import_module(f"hopperopt.{FIGURES}.{given.name}")
-    module.write(given.params, *given.input, given.output)
+    # A figure is one thing in several formats: it takes its outputs as one list.
+    outputs = [given.output] if given.stage.function == "write" else given.output
+    getattr(module, given.stage.function)(given.params, *inputs, *outputs)
 
 
 def _stamp_files() -> None:

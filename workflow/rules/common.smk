@@ -1,0 +1,127 @@
+"""The study as the rules see it: names, paths, and what each job depends on beside its files.
+
+A job's parameters are one JSON string with sorted keys: the resolved settings of its stage and a digest of the
+stage's code. When neither changes, nothing is computed anew.
+"""
+
+import functools
+import json
+import re
+from pathlib import Path
+
+from snakemake.exceptions import WorkflowError
+from snakemake.logging import logger
+
+from hopperopt import cli, provenance
+from hopperopt import config as configuration
+
+try:
+    STUDY = configuration.parse(config, Path.cwd())
+except configuration.ConfigError as error:
+    raise WorkflowError(f"the configuration cannot be used:\n{error}") from None
+if workflow.is_main_process:
+    for warning in STUDY.warnings():
+        logger.warning(warning)
+
+DESIGNS = dict(STUDY.experiments())
+EXPERIMENTS = list(DESIGNS)
+REPLICATES = range(1, STUDY.design.replicates + 1)
+CASES = STUDY.cases()
+
+
+def result(path):
+    """Path of an output, below the study's directory."""
+    return f"{STUDY.results_dir}/{path}"
+
+
+def log_of(path):
+    """Path of a job's log, below the study's directory."""
+    return result(f"logs/{path}.log")
+
+
+def one_of(names):
+    """Regular expression that matches any of the names."""
+    return "|".join(re.escape(name) for name in names)
+
+
+def figures():
+    """All figures as PNG and PDF."""
+    return expand(result("figures/{name}.{format}"), name=cli.FIGURES, format=["png", "pdf"])
+
+
+@functools.cache
+def code(module):
+    """Digest of the code of a stage, a module of the package."""
+    return provenance.code_digest(f"hopperopt.{module}")
+
+
+def as_json(settings, module):
+    """Parameters of a job: its settings and the digest of its code as one string."""
+    return json.dumps({**settings, "code": code(module)}, sort_keys=True)
+
+
+def stage(name):
+    """Parameters of a stage."""
+    return as_json(STUDY.stage_params(name), cli.STAGES[name].module)
+
+
+def figure(name):
+    """Parameters of a figure."""
+    return as_json(STUDY.stage_params("figures"), f"figures.{name}")
+
+
+@functools.cache
+def case_of(design, name, replicate):
+    """Case of a run; design: JSON of the factor values, or null without an insert."""
+    return STUDY.simulation_case(json.loads(design), name, replicate)
+
+
+def experiment_case(wildcards):
+    """Case of a run of the plan."""
+    return case_of(json.dumps(DESIGNS[wildcards.experiment]), wildcards.experiment, int(wildcards.replicate))
+
+
+def is_derived(case):
+    """Whether a verification case has the design that the study finds."""
+    return CASES[case] == "derived"
+
+
+def verification_case(wildcards):
+    """Case of a run of the verification; all but the design where that is yet to be found."""
+    name, replicate = wildcards.case, int(wildcards.replicate)
+    if is_derived(name):
+        return STUDY.derived_params(name, replicate)
+    return case_of(json.dumps(CASES[name]), name, replicate)
+
+
+def found_design(wildcards):
+    """File of the design that a verification run needs; none for the designs that the configuration fixes."""
+    return [result("optimum/selected.yaml")] if is_derived(wildcards.case) else []
+
+
+def experiment_params(wildcards):
+    """Parameters of a simulation of the plan."""
+    return as_json(experiment_case(wildcards), cli.SIMULATION)
+
+
+def verification_params(wildcards):
+    """Parameters of a simulation of the verification."""
+    return as_json(verification_case(wildcards), cli.SIMULATION)
+
+
+def verification_runs(case):
+    """Files of a verification case's runs."""
+    replicates = range(1, STUDY.verification.replicates + 1)
+    return expand(result("verification/{case}_rep_{replicate}.nc"), case=case, replicate=replicates)
+
+
+def shown_case():
+    """Verification case that the figures show: the one that the study found, or else the first."""
+    return next((case for case in CASES if is_derived(case)), next(iter(CASES)))
+
+
+def shown_run():
+    """Run whose particles the figures show: the plan's centre, or else its first experiment."""
+    if "plan_centre" in CASES:
+        return verification_runs("plan_centre")[0]
+    return result(f"simulations/{EXPERIMENTS[0]}_rep_1.nc")

@@ -1,0 +1,120 @@
+rule figure_hopper:
+    """Hopper with particles before and during the discharge, front and side view."""
+    input:
+        run=shown_run(),
+    output:
+        png=report(result("figures/hopper.png"), caption="../report/hopper.rst", category="Figures"),
+        pdf=result("figures/hopper.pdf"),
+    log:
+        log_of("figures/hopper"),
+    params:
+        settings=figure("hopper"),
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=5,
+    shell:
+        "python -m hopperopt figure hopper --params {params.settings:q} --run {input.run:q} "
+        "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
+
+
+rule figure_curves:
+    """Simulated mass fractions in the outflow against M, all experiments."""
+    input:
+        dataset=result("dataset.nc"),
+    output:
+        png=report(result("figures/curves.png"), caption="../report/curves.rst", category="Figures"),
+        pdf=result("figures/curves.pdf"),
+    log:
+        log_of("figures/curves"),
+    params:
+        settings=figure("curves"),
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=5,
+    shell:
+        "python -m hopperopt figure curves --params {params.settings:q} --dataset {input.dataset:q} "
+        "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
+
+
+rule figure_fit:
+    """Targets and network, all experiments."""
+    input:
+        training=result("surrogate/training.nc"),
+        network=result("surrogate/network.nc"),
+    output:
+        png=report(result("figures/fit.png"), caption="../report/fit.rst", category="Figures"),
+        pdf=result("figures/fit.pdf"),
+    log:
+        log_of("figures/fit"),
+    params:
+        settings=figure("fit"),
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=5,
+    shell:
+        "python -m hopperopt figure fit --params {params.settings:q} --training {input.training:q} --network {input.network:q} "
+        "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
+
+
+rule figure_verification:
+    """Predicted and simulated outflow at the optimum."""
+    input:
+        simulations=verification_runs(shown_case()),
+        network=result("surrogate/network.nc"),
+    output:
+        png=report(result("figures/verification.png"), caption="../report/verification.rst", category="Figures"),
+        pdf=result("figures/verification.pdf"),
+    log:
+        log_of("figures/verification"),
+    params:
+        settings=figure("verification"),
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=5,
+    shell:
+        "python -m hopperopt figure verification --params {params.settings:q} --simulations {input.simulations:q} --network {input.network:q} "
+        "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
+
+
+rule figure_front:
+    """Pareto front with the selected point."""
+    input:
+        front=result("optimum/front.csv"),
+    output:
+        png=report(result("figures/front.png"), caption="../report/front.rst", category="Figures"),
+        pdf=result("figures/front.pdf"),
+    log:
+        log_of("figures/front"),
+    params:
+        settings=figure("front"),
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=5,
+    shell:
+        "python -m hopperopt figure front --params {params.settings:q} --front {input.front:q} "
+        "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
+
+
+rule figure_errors:
+    """Errors of the networks against their hidden size."""
+    input:
+        errors=result("surrogate/errors.csv"),
+    output:
+        png=report(result("figures/errors.png"), caption="../report/errors.rst", category="Figures"),
+        pdf=result("figures/errors.pdf"),
+    log:
+        log_of("figures/errors"),
+    params:
+        settings=figure("errors"),
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=5,
+    shell:
+        "python -m hopperopt figure errors --params {params.settings:q} --errors {input.errors:q} "
+        "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"

@@ -1,0 +1,23 @@
+rule gather:
+    """One data set of all runs of the plan."""
+    input:
+        design=result("design.csv"),
+        simulations=expand(
+            result("simulations/{experiment}_rep_{replicate}.nc"),
+            experiment=EXPERIMENTS,
+            replicate=REPLICATES,
+        ),
+    output:
+        dataset=result("dataset.nc"),
+        runs=report(result("runs.csv"), caption="../report/runs.rst", category="Tables"),
+    log:
+        log_of("gather"),
+    params:
+        settings=stage("gather"),
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    shell:
+        "python -m hopperopt gather --params {params.settings:q} --design {input.design:q} "
+        "--simulations {input.simulations:q} --output {output.dataset:q} {output.runs:q} > {log:q} 2>&1"

@@ -1,0 +1,16 @@
+rule simulate:
+    """One run of an experiment of the plan."""
+    output:
+        result("simulations/{experiment}_rep_{replicate}.nc"),
+    log:
+        log_of("simulate/{experiment}_rep_{replicate}"),
+    benchmark:
+        result("logs/simulate/{experiment}_rep_{replicate}.tsv")
+    params:
+        case=experiment_params,
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=60,
+    shell:
+        "python -m hopperopt simulate --case {params.case:q} --output {output:q} > {log:q} 2>&1"

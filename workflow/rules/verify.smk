@@ -1,0 +1,41 @@
+rule verify_simulate:
+    """One run of a verification case; only a design that the study finds has a result as its input."""
+    input:
+        design=found_design,
+    output:
+        result("verification/{case}_rep_{replicate}.nc"),
+    log:
+        log_of("verify_simulate/{case}_rep_{replicate}"),
+    benchmark:
+        result("logs/verify_simulate/{case}_rep_{replicate}.tsv")
+    params:
+        case=verification_params,
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=60,
+    shell:
+        "python -m hopperopt simulate --case {params.case:q} --design {input.design:q} "
+        "--output {output:q} > {log:q} 2>&1"
+
+
+rule verify:
+    """Prediction beside simulation."""
+    input:
+        simulations=[verification_runs(case) for case in CASES],
+        network=result("surrogate/network.nc"),
+    output:
+        summary=report(
+            result("verification/summary.csv"), caption="../report/summary.rst", category="Tables"
+        ),
+    log:
+        log_of("verify"),
+    params:
+        settings=stage("verify"),
+    threads: 1
+    resources:
+        mem_mb=500,
+        runtime=5,
+    shell:
+        "python -m hopperopt verify --params {params.settings:q} --simulations {input.simulations:q} "
+        "--network {input.network:q} --output {output.summary:q} > {log:q} 2>&1"
