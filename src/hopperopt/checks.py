@@ -16,6 +16,7 @@ MM = 1000.0
 SIMULATED = {"hopper", "insert", "particles", "wall", "contact", "filling", "discharge", "simulation"}
 SMALLEST_GAP, USUAL_GAP = 2, 3  # coarse diameters between insert and wall
 USUAL_OUTLET = 5  # coarse diameters
+MOST_PARTICLES = 10_000_000
 USUAL_STEP = 0.4  # Rayleigh times
 # Materials up to these take the longer step: see the specification of the contact law.
 TESTED = {"step": 0.78, "restitution": 0.7, "static_friction": 0.5}
@@ -43,6 +44,7 @@ def _sentence(finding, where=""):
 def _refused(setup):
     """Findings that make a simulation impossible: hopper, time step, insert."""
     yield from _hopper(setup)
+    yield from _filling(setup)
     yield from _time_step(setup)
     if setup.insert_profile is not None:
         yield from _insert(setup)
@@ -60,6 +62,17 @@ def _hopper(setup):
     if hopper.outlet_radius_mm < coarse / 2:
         allowed = f"at least the radius of the largest sphere, {coarse / 2:g} mm"
         yield _no("hopper.outlet_radius_mm", "small", 0, f"{hopper.outlet_radius_mm:g}", allowed)
+
+
+def _filling(setup):
+    level, coarse = setup.filling.level_mm, setup.particles.diameters_mm[-1]
+    if level < coarse:
+        yield _no(
+            "filling.level_mm", "level", -level, f"{level:g}", f"at least a coarse diameter, {coarse:g} mm"
+        )
+    if setup.particle_count > MOST_PARTICLES:
+        count, allowed = f"filling with {setup.particle_count:.2g} particles", f"at most {MOST_PARTICLES:g}"
+        yield _no("particles.diameters_mm", "count", setup.particle_count, count, allowed)
 
 
 def _time_step(setup):
@@ -155,10 +168,10 @@ def mistakes(study, faulty):
     rules = (
         ("keys", SIMULATED | {"factors"}, _factor_keys),
         ("plan", {"factors", "design"}, _plan),
-        ("network", {"surrogate", "design", "plan"}, _network),
+        ("network", {"surrogate", "design", "plan", "keys"}, _network),
         ("explicit", {"factors", "optimise"}, _explicit),
         ("cases", {"factors", "verification"}, _cases),
-        ("names", {"cases", "plan"}, _names),
+        ("names", {"cases", "plan", "keys"}, _names),
         ("plan values", {"plan", "keys"}, _plan_values),
         ("case values", {"explicit", "cases", "keys"}, _case_values),
     )

@@ -61,7 +61,11 @@ class Number(Quantity):
 
 
 Positive = Annotated[float, Number(above=0)]
-NotNegative = Annotated[float, Number(least=0)]
+Length = Annotated[float, Number(above=0, most=100_000)]
+Coordinate = Annotated[float, Number(least=-100_000, most=100_000)]
+Density = Annotated[float, Number(above=0, most=100_000)]
+Speed = Annotated[float, Number(least=0, most=100)]
+Friction = Annotated[float, Number(least=0, most=10)]
 Share = Annotated[float, Number(least=0, most=1)]
 Finite = Annotated[float, Number()]
 Count = Annotated[int, Number(least=1)]
@@ -79,9 +83,9 @@ class Model(BaseModel):
 class Hopper(Model):
     """A conical hopper below a cylinder."""
 
-    outlet_radius_mm: Positive = 22.5
+    outlet_radius_mm: Length = 22.5
     half_angle_deg: Annotated[float, Number(above=0, most=90)] = 45.0
-    cylinder_radius_mm: Positive = 50.0
+    cylinder_radius_mm: Length = 50.0
 
     @property
     def _shape(self):
@@ -101,7 +105,7 @@ class Cone(Model):
     """A solid cone, apex up: slope angle from the horizontal, length along the slope."""
 
     slope_deg: Annotated[float, Number(above=0, below=90)] = 55.0
-    length_mm: Positive = 40.0
+    length_mm: Length = 40.0
 
     def profile(self):
         """Profile above the insert's height (m)."""
@@ -112,7 +116,7 @@ class Profile(Model):
     """A body of one's own: points r, z (z from the insert's height), in a CSV file or typed in."""
 
     file: Annotated[str, StringConstraints(min_length=1)] | None = None
-    points_mm: tuple[tuple[Finite, Finite], ...] | None = None
+    points_mm: tuple[tuple[Coordinate, Coordinate], ...] | None = None
 
     def profile(self):
         """Profile above the insert's height (m)."""
@@ -123,7 +127,7 @@ class Insert(Model):
     """The body in the hopper; `shape` picks one of the sections below it."""
 
     shape: Literal["cone", "profile", "none"] = "cone"
-    height_mm: Positive = 29.6
+    height_mm: Length = 29.6
     cone: Cone = Cone()
     profile: Profile = Profile()
 
@@ -143,9 +147,9 @@ def _ascending(diameters):
 class Particles(Model):
     """Spheres: equal numbers of three diameters, one material."""
 
-    diameters_mm: Annotated[tuple[Positive, ...], AfterValidator(_ascending)] = (2.0, 3.0, 4.0)
-    density_kg_m3: Positive = 2285.0
-    shear_modulus_pa: Positive = 1.0e7
+    diameters_mm: Annotated[tuple[Length, ...], AfterValidator(_ascending)] = (2.0, 3.0, 4.0)
+    density_kg_m3: Density = 2285.0
+    shear_modulus_pa: Annotated[float, Number(above=0, most=1e13)] = 1.0e7
     poisson_ratio: Poisson = 0.25
 
     @property
@@ -163,31 +167,23 @@ class Particles(Model):
 class Wall(Model):
     """Material of hopper, gate and insert; an infinite modulus is a rigid wall."""
 
-    shear_modulus_pa: Annotated[float, Number(above=0, infinite=True)] = 2.2e7
+    shear_modulus_pa: Annotated[float, Number(above=0, most=1e13, infinite=True)] = 2.2e7
     poisson_ratio: Poisson = 0.25
 
 
-class Friction(Model):
-    """How a particle touches another body."""
-
-    static_friction: NotNegative
-    rolling_friction: NotNegative
-    restitution: Share
-
-
-class ParticleContact(Friction):
+class ParticleContact(Model):
     """Particle against particle."""
 
-    static_friction: NotNegative = 0.5
-    rolling_friction: NotNegative = 0.05
+    static_friction: Friction = 0.5
+    rolling_friction: Friction = 0.05
     restitution: Share = 0.7
 
 
-class WallContact(Friction):
+class WallContact(Model):
     """Particle against hopper, gate and insert."""
 
-    static_friction: NotNegative = 0.5
-    rolling_friction: NotNegative = 0.25
+    static_friction: Friction = 0.5
+    rolling_friction: Friction = 0.25
     restitution: Share = 0.2
 
 
@@ -208,19 +204,21 @@ def _thirds(count):
 class Filling(Model):
     """How the hopper is filled: up to a level, or with a fixed number of particles."""
 
-    level_mm: Positive = 74.0
-    particles: Annotated[int | None, Number(least=3, most=10_000_000), AfterValidator(_thirds)] = None
+    level_mm: Length = 74.0
+    particles: Annotated[int | None, Number(least=3, most=checks.MOST_PARTICLES), AfterValidator(_thirds)] = (
+        None
+    )
     bed_solid_fraction: Annotated[float, Number(above=0, most=0.74)] = 0.55
     column_solid_fraction: Annotated[float, Number(above=0, most=0.3)] = 0.2
-    speed_m_s: NotNegative = 0.5
-    speed_scatter_m_s: NotNegative = 0.05
+    speed_m_s: Speed = 0.5
+    speed_scatter_m_s: Speed = 0.05
     settling_limit_s: Positive = 1.5
 
 
 class Discharge(Model):
     """How the discharge is measured, and what becomes of one that does not end."""
 
-    sensor_mm: Annotated[float, Number(below=0)] = -12.0
+    sensor_mm: Annotated[float, Number(least=-100_000, below=0)] = -12.0
     idle_limit_s: Positive = 0.5
     time_limit_s: Positive = 10.0
     incomplete: Literal["refuse", "drop"] = "refuse"
@@ -230,7 +228,7 @@ class Simulation(Model):
     """Time step (`auto`: a fifth of the Rayleigh time) and gravity."""
 
     time_step_s: Annotated[float | Literal["auto"], Number(above=0)] = 4.0e-5
-    gravity_m_s2: Positive = 9.81
+    gravity_m_s2: Annotated[float, Number(above=0, most=1000)] = 9.81
 
 
 class Setup(Model):
@@ -381,11 +379,14 @@ def _read_case(value):
         raise NotAllowed(allowed) from None
 
 
+Case = Annotated[str | dict[str, float], BeforeValidator(_read_case)]
+
+
 class Verification(Model):
     """The designs that are simulated anew, by name."""
 
     replicates: Count = 1
-    cases: dict[Name, Annotated[str | dict[str, float], BeforeValidator(_read_case)]] = {
+    cases: Annotated[dict[Name, Case], Field(min_length=1)] = {
         "selected": "selected",
         "plan_centre": "plan_centre",
         "bare": "bare",
@@ -568,13 +569,13 @@ def _models(document):
 
 def _with_files(study, directory):
     """The study with its CSV files read, and the sentences for those that cannot be used."""
-    found = []
-    if study.insert.shape == "profile" and study.insert.profile.file is not None:
+    found, own = [], study.insert.profile
+    if study.insert.shape == "profile" and (own.file is not None or own.points_mm is None):
         try:
-            points = plans.points_from_csv(read_text(directory / study.insert.profile.file))
+            points = plans.points_from_csv("" if own.file is None else read_text(directory / own.file))
             study = study.with_values({"insert.profile.points_mm": points, "insert.profile.file": None})
         except NotAllowed as error:
-            found.append(mistake("insert.profile.file", study.insert.profile.file, error))
+            found.append(mistake("insert.profile.file", own.file, error))
     if study.design.plan == "csv":
         try:
             study._own_plan = plans.from_csv(read_text(directory / study.design.csv.file), study.levels)

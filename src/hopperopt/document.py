@@ -33,7 +33,10 @@ def load(paths, overrides=None):
     """The raw document of several files, later ones merged over earlier ones as Snakemake merges them."""
     document = {}
     for path in paths:
-        merge(document, _read(Path(path)))
+        try:
+            merge(document, _read(Path(path)))
+        except RecursionError:  # a YAML anchor inside itself
+            raise ConfigError(f"{path}: holds a section that contains itself") from None
     return merge(document, overrides or {})
 
 

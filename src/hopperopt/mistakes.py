@@ -6,6 +6,15 @@ from typing import Annotated, Union, get_args, get_origin
 
 from hopperopt.document import NotAllowed, mistake, shown
 
+WORDS = {
+    tuple: "a list",
+    list: "a list",
+    dict: "keys with their values",
+    str: "text",
+    Annotated: "text",
+    type(None): "null",
+}
+
 
 def sentences(errors, model):
     """One sentence for each of pydantic's error dicts; `model` is the class of the whole document.
@@ -19,7 +28,7 @@ def sentences(errors, model):
 
 
 def _sentence(error, model):
-    path = error["loc"]
+    path = tuple(part for part in error["loc"] if part != "[key]")
     key = ".".join(str(part) for part in path) or "configuration"
     kind, value = error["type"], error["input"]
     if kind == "extra_forbidden":
@@ -73,8 +82,8 @@ def _expected(annotation):
     if get_origin(annotation) is Annotated:
         described = [item.allowed for item in annotation.__metadata__ if hasattr(item, "allowed")]
         return described[0] if described else _expected(annotation.__origin__)
-    words = {tuple: "a list", list: "a list", dict: "keys with their values", str: "text"}
-    return words.get(get_origin(annotation) or annotation, "another value")
+    kinds = [get_origin(kind) or kind for kind in _alternatives(annotation)]
+    return " or ".join(WORDS.get(kind, "another value") for kind in kinds)
 
 
 def _fields(annotation):

@@ -1,9 +1,13 @@
 """The configuration: what it accepts, what it says about mistakes, and what reaches the stages."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hopperopt import config, document
 from hopperopt.config import ConfigError
@@ -84,13 +88,14 @@ def test_unknown_key_is_named_with_its_value_and_the_nearest(key, value, said):
         ("hopper.outlet_radius_mm", "22,5", "a number above 0"),
         ("hopper.half_angle_deg", 91, "a number above 0 and at most 90"),
         ("particles.density_kg_m3", -2285, "a number above 0"),
-        ("wall.shear_modulus_pa", "-.inf", "a number above 0 or .inf"),
+        ("wall.shear_modulus_pa", "-.inf", "a number above 0 and at most 1e+13 or .inf"),
         ("wall.poisson_ratio", 0.6, "a number at least 0 and at most 0.5"),
         ("contact.particle.restitution", 1.1, "a number at least 0 and at most 1"),
         ("contact.rolling", "EDEM", "edem, cdt or none"),
         ("insert.shape", "cube", "cone, profile or none"),
         ("insert.shape", None, "cone, profile or none"),
-        ("discharge.sensor_mm", 12, "a number below 0"),
+        ("discharge.sensor_mm", 12, "a number at least -100000 and below 0"),
+        ("insert.height_mm", 1e300, "a number above 0 and at most 100000"),
         ("simulation.time_step_s", "automatic", "a number above 0 or auto"),
         ("simulation.time_step_s", True, "a number above 0 or auto"),
         ("filling.particles", 1000, "null or a multiple of 3"),
@@ -180,3 +185,428 @@ def test_rigid_wall_is_accepted():
     for typed in (float("inf"), ".inf"):
         case = config.parse({"wall": {"shear_modulus_pa": typed}}).simulation_case(None, "bare", 1)
         assert case["wall"]["shear_modulus"] == float("inf")
+
+
+def test_names_are_plain():
+    line = only({"factors": {"Theta": {"key": "insert.cone.slope_deg", "levels": [50, 60, 52, 54, 56]}}})
+    assert line.startswith('factors.Theta: "Theta" is not allowed; allowed: small letters')
+    assert only({"insert": {"profile": {"file": True}}}).endswith("allowed: text or null")
+    assert "at least 1 entries" in only({"verification": {"cases": {"selected": None}}})
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "allowed"),
+    [
+        ({"hopper": {"outlet_radius_mm": 55}}, "hopper.cylinder_radius_mm", "more than the outlet's radius"),
+        (
+            {"hopper": {"outlet_radius_mm": 1.9}, "insert": {"shape": "none"}},
+            "hopper.outlet_radius_mm",
+            "2 mm",
+        ),
+        ({"filling": {"level_mm": 0.074}}, "filling.level_mm", "at least a coarse diameter, 4 mm"),
+        ({"simulation": {"time_step_s": 6e-5}}, "simulation.time_step_s", "at most 5.18e-05"),
+        ({"particles": {"shear_modulus_pa": 1e8}}, "simulation.time_step_s", "at most 1.64e-05"),
+    ],
+)
+def test_setup_that_cannot_be_simulated(changes, key, allowed):
+    lines = [line for line in sentences(changes) if line.startswith(key)]
+    assert len(lines) == 1 and allowed in lines[0]
+
+
+def test_value_that_the_factors_replace_is_in_no_design():
+    config.parse({"insert": {"height_mm": 1, "cone": {"length_mm": 900}}})
+
+
+def three_factors(**levels):
+    """Factors of the study with other levels."""
+    return {"factors": {name: {"levels": values} for name, values in levels.items()}}
+
+
+def with_paper(changes):
+    """Changes merged over the shipped file."""
+    return document.merge(config.load([ROOT / "config.yaml"]), changes)
+
+
+def test_insert_that_does_not_fit_is_said_once_for_the_worst_design():
+    line = only(with_paper(three_factors(length_mm=[90, 45, 40, 35, 30])))
+    assert line.startswith("insert: an insert that touches the wall or lies beyond it (in exp_")
+    assert "length_mm 90" in line and "and 4 more" in line and "at least 8 mm (2 coarse diameters)" in line
+
+
+def test_insert_that_blocks_is_refused_and_a_narrow_gap_is_a_warning():
+    line = only(with_paper(three_factors(height_mm=[34, 32, 29.6, 28, 20])))
+    assert line.startswith("insert: a gap of 7.33 mm between insert and wall (in exp_21: ")
+    (narrow,) = [
+        line for line in config.parse({}).warnings() if line.startswith("insert: a gap to the wall of 2.89")
+    ]
+    assert "exp_21: theta_deg 50, length_mm 50, height_mm 26" in narrow
+
+
+def test_apex_above_the_bed_is_only_a_warning():
+    (line,) = [line for line in config.parse({}).warnings() if "apex" in line]
+    assert "77.3 mm" in line and "exp_01" in line and "and 1 more" in line
+
+
+@pytest.mark.parametrize(
+    ("changes", "warned"),
+    [
+        ({}, False),
+        ({"simulation": {"time_step_s": 4.2e-5}}, True),
+        ({"contact": {"particle": {"restitution": 0.8}}}, True),
+        ({"contact": {"wall": {"static_friction": 1}}}, True),
+        ({"contact": {"wall": {"static_friction": 1}}, "simulation": {"time_step_s": 2e-5}}, False),
+        ({"contact": {"wall": {"static_friction": 1}}, "simulation": {"time_step_s": "auto"}}, False),
+    ],
+)
+def test_long_step_is_a_warning_outside_the_tested_materials(changes, warned):
+    lines = config.parse(changes).warnings()
+    assert any(line.startswith("simulation.time_step_s") for line in lines) == warned
+
+
+def test_narrow_outlet_is_a_warning():
+    changes = {"hopper": {"outlet_radius_mm": 9.9}, "verification": {"cases": {"bare": "bare"}}}
+    plan = {"plan": "lhs"}, {"theta_deg": {"key": "insert.cone.slope_deg", "levels": [59, 60]}}
+    small = {"cone": {"length_mm": 10}}
+    study = config.parse({**changes, "design": plan[0], "factors": plan[1], "insert": small})
+    assert [
+        line for line in study.warnings() if line.startswith("hopper.outlet_radius_mm: an outlet of 4.95 ")
+    ]
+    assert not [line for line in config.parse({}).warnings() if line.startswith("hopper")]
+
+
+def plan_file(folder, text):
+    """Changes that take the plan from a CSV file."""
+    (folder / "plan.csv").write_text(text)
+    return {"design": {"plan": "csv"}, "surrogate": {"validation_experiments": 1, "test_experiments": 1}}
+
+
+TWO_FACTORS = {
+    "length_mm": {"key": "insert.cone.length_mm", "levels": [30, 50]},
+    "height_mm": {"key": "insert.height_mm", "levels": [15, 34]},
+}
+FOUR_ROWS = "experiment,length_mm,height_mm\nlow,30,15\nhigh,50,34\na,40,30\nb,40,34\n"
+
+
+def test_corner_of_the_ranges_that_does_not_fit_is_a_warning(tmp_path):
+    study = config.parse({**plan_file(tmp_path, FOUR_ROWS), "factors": TWO_FACTORS}, tmp_path)
+    (line,) = [line for line in study.warnings() if "optimiser" in line]
+    assert "a corner: length_mm 50, height_mm 15" in line
+
+
+def test_own_plan_is_read_with_the_configuration(tmp_path):
+    study = config.parse({**plan_file(tmp_path, FOUR_ROWS), "factors": TWO_FACTORS}, tmp_path)
+    assert study.experiments()[0] == ("low", {"length_mm": 30.0, "height_mm": 15.0})
+    (tmp_path / "plan.csv").unlink()
+    assert len(study.experiments()) == 4
+    assert "cannot" not in only({"design": {"plan": "csv"}, "factors": TWO_FACTORS}, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "the columns experiment, length_mm, height_mm"),
+        ("experiment,length_mm\na,40\n", "the columns experiment, length_mm, height_mm"),
+        (FOUR_ROWS + "a,41,31\n", "a is there twice"),
+        (FOUR_ROWS + "c-1,41,31\n", "line 6 has 'c-1'"),
+        (FOUR_ROWS + "c,41\n", "line 6 has height_mm None"),
+        (FOUR_ROWS + "c,nan,30\n", "line 6 has length_mm 'nan'"),
+    ],
+)
+def test_own_plan_that_cannot_be_used(tmp_path, text, said):
+    line = only({**plan_file(tmp_path, text), "factors": TWO_FACTORS}, tmp_path)
+    assert line.startswith('design.csv.file: "plan.csv" is not allowed') and said in line
+
+
+def test_own_plan_is_checked_like_any_other(tmp_path):
+    changes = {**plan_file(tmp_path, FOUR_ROWS + "c,-5,30\n"), "factors": TWO_FACTORS}
+    assert only(changes, tmp_path) == (
+        "insert.cone.length_mm: -5.0 is not allowed; allowed: a number above 0 and at most 100000 (in c)"
+    )
+    changes = {**plan_file(tmp_path, FOUR_ROWS + "bare,50,30\n"), "factors": TWO_FACTORS}
+    assert only(changes, tmp_path).startswith("verification.cases.bare: ")
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "said"),
+    [
+        (three_factors(theta_deg=[60, 55, 52, 50]), "factors.theta_deg.levels", "five levels"),
+        (three_factors(theta_deg=[60, 55, 55, 52, 50]), "factors.theta_deg.levels", "levels that differ"),
+        (three_factors(theta_deg=[95, 55, 54, 52, 50]), "factors.theta_deg.levels", "below 90"),
+        ({"factors": {"theta_deg": {"key": "insert.cone.slop_deg"}}}, "factors.theta_deg.key", "slope_deg?"),
+        (
+            {"factors": {"theta_deg": {"key": "insert.height_mm"}}},
+            "factors.height_mm.key",
+            "theta_deg does not",
+        ),
+        ({"factors": {"theta_deg": {"key": "surrogate.seed"}}}, "factors.theta_deg.key", "simulations use"),
+        (
+            {"factors": {"theta_deg": {"key": "insert.shape"}}},
+            "factors.theta_deg.levels",
+            "cone, profile or none",
+        ),
+        ({"insert": {"shape": "none"}}, "factors.theta_deg.key", "makes none"),
+        ({"surrogate": {"selected_hidden_nodes": 11}}, "surrogate.selected_hidden_nodes", "auto or one of 3"),
+        ({"surrogate": {"hidden_nodes": [7, 7]}}, "surrogate.hidden_nodes", "differ"),
+        ({"surrogate": {"test_experiments": 21}}, "surrogate.validation_experiments", "at most 23"),
+        ({"optimise": {"select": "explicit"}}, "optimise.explicit", "theta_deg, length_mm, height_mm"),
+        (
+            {"optimise": {"select": "explicit", "explicit": {**CENTRE, "theta_deg": 61}}},
+            "optimise.explicit.theta_deg",
+            "50 to 60",
+        ),
+        (
+            {"verification": {"cases": {"paper": {"theta_deg": 56.7}}}},
+            "verification.cases.paper",
+            "a number for",
+        ),
+        (
+            {"verification": {"cases": {"paper": {**CENTRE, "length_mm": -1}}}},
+            "verification.cases.paper",
+            "a number above 0",
+        ),
+        ({"verification": {"cases": {"exp_01": "bare"}}}, "verification.cases.exp_01", "no experiment"),
+    ],
+)
+def test_parts_that_do_not_go_together(changes, key, said):
+    lines = sentences(with_paper(changes))
+    assert lines[0].startswith(f"{key}: ") and said in lines[0]
+
+
+def test_null_leaves_out_a_factor_and_a_case():
+    study = config.parse(
+        with_paper({"factors": {"theta_deg": None}, "verification": {"cases": {"bare": None}}})
+    )
+    assert list(study.levels) == ["length_mm", "height_mm"]
+    assert list(study.cases()) == ["selected", "plan_centre"]
+
+
+def test_cases():
+    paper = {"theta_deg": 56.7, "length_mm": "32.4", "height_mm": 33}
+    study = config.parse(with_paper({"verification": {"cases": {"paper": paper}}}))
+    assert study.cases() == {
+        "selected": "derived",
+        "plan_centre": CENTRE,
+        "bare": None,
+        "paper": {"theta_deg": 56.7, "length_mm": 32.4, "height_mm": 33.0},
+    }
+
+
+def test_any_number_can_be_a_factor():
+    factors = {
+        "coarse_mm": {"key": "particles.diameters_mm.2", "levels": [3.5, 4]},
+        "friction": {"key": "contact.wall.static_friction", "levels": [0.3, 0.5]},
+    }
+    design = {"plan": "lhs", "lhs": {"experiments": 12}}
+    study = config.parse({"factors": factors, "design": design})
+    case = study.simulation_case({"coarse_mm": 3.6, "friction": 0.4}, "exp_01", 1)
+    assert case["particles"]["diameters"][2] == 0.0036
+    assert case["contact"]["wall"]["static_friction"] == 0.4
+    assert case["design"] == {"coarse_mm": 3.6, "friction": 0.4}
+
+
+def test_case_of_the_centre():
+    case = config.parse({}).simulation_case(CENTRE, "plan_centre", 1)
+    (outlet, edge, top), gate, insert = (case["walls"][name] for name in ("hopper", "gate", "insert"))
+    assert (outlet, edge, gate) == ([0.0225, 0.0], [0.05, 0.0275], [[0.0, 0.0], [0.0225, 0.0]])
+    assert insert == [[0.0, 0.0296], [0.022943057454, 0.0296], [0.0, 0.062366081772]]
+    count = sum(case["particles"]["counts"])
+    assert 14_700 < count < 15_000
+    fine, _, coarse = case["particles"]["diameters"]
+    assert case["filling"]["column_bottom"] == pytest.approx(0.079)
+    assert case["filling"]["column_radius"] == 0.05 - coarse / 2
+    column = count / 3 * 3.141592653589793 / 6 * (fine**3 + 0.003**3 + coarse**3) / 0.2
+    assert top[0] == 0.05
+    assert top[1] == pytest.approx(0.079 + column / (3.141592653589793 * 0.048**2) + 0.02)
+    assert json.loads(json.dumps(case)) == case
+
+
+def test_column_starts_above_a_high_apex_and_above_the_cone():
+    study = config.parse({})
+    high = study.simulation_case({"theta_deg": 60, "length_mm": 50, "height_mm": 34}, "exp_01", 1)
+    apex = high["walls"]["insert"][-1][1]
+    assert apex > 0.074 and high["filling"]["column_bottom"] == pytest.approx(apex + 0.005)
+    low = config.parse({"filling": {"level_mm": 10, "particles": 900}}).simulation_case(None, "bare", 1)
+    assert low["filling"]["column_bottom"] == pytest.approx(0.0275 + 0.005)
+
+
+def test_particle_counts_of_the_plan_are_the_papers():
+    study = config.parse({})
+    counts = [
+        sum(study.simulation_case(design, name, 1)["particles"]["counts"])
+        for name, design in study.experiments()
+    ]
+    assert min(counts) > 14_050 and max(counts) < 15_250  # about 14,100 to 15,200
+
+
+def test_bare_hopper_has_nothing_of_an_insert():
+    changes = {"insert": {"height_mm": 30, "cone": {"slope_deg": 40}}}
+    bare, other = (config.parse(with_paper(c)).simulation_case(None, "bare", 1) for c in ({}, changes))
+    assert bare == other
+    assert bare["walls"]["insert"] is None and bare["design"] == {}
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("results_dir", "elsewhere"),
+        ("surrogate.starts", 5),
+        ("surrogate.selected_hidden_nodes", 5),
+        ("optimise.seed", 2),
+        ("figures.dpi", 300),
+        ("verification.replicates", 3),
+        ("design.replicates", 3),
+        ("discharge.incomplete", "drop"),
+        ("insert.profile.file", "unused.csv"),
+        ("insert.height_mm", 30),
+        ("factors.theta_deg.levels", [61, 57.5, 55, 52.5, 50]),
+    ],
+)
+def test_case_and_derived_case_hold_nothing_of_other_sections(key, value):
+    plain, changed = config.parse({}), config.parse(with_paper(nested(key, value)))
+    assert plain.simulation_case(CENTRE, "exp_13", 1) == changed.simulation_case(CENTRE, "exp_13", 1)
+    assert plain.derived_params("selected", 1) == changed.derived_params("selected", 1)
+
+
+def test_derived_case_is_that_of_the_same_design():
+    study = config.parse(with_paper({"insert": {"height_mm": 31}, "wall": {"shear_modulus_pa": ".inf"}}))
+    params = json.loads(json.dumps(study.derived_params("selected", 2)))
+    assert config.derived_case(params, CENTRE) == study.simulation_case(CENTRE, "selected", 2)
+    with pytest.raises(ConfigError, match="touches the wall"):
+        config.derived_case(params, {**CENTRE, "length_mm": 90})
+
+
+def test_seed_follows_from_study_name_and_replicate():
+    study, other = config.parse({}), config.parse({"seed": 2})
+    seeds = {
+        s.simulation_case(CENTRE, name, replicate)["seed"]
+        for s in (study, other)
+        for name in ("exp_01", "exp_02", "selected")
+        for replicate in (1, 2)
+    }
+    assert len(seeds) == 12
+    assert study.simulation_case(CENTRE, "exp_01", 1)["seed"] == study.derived_params("exp_01", 1)["seed"]
+
+
+def test_design_is_validated():
+    study = config.parse({})
+    for design, said in [
+        ({"theta": 55}, "allowed: theta_deg, length_mm, height_mm"),
+        ({"theta_deg": "steep"}, "insert.cone.slope_deg: "),
+        ({"theta_deg": True}, "insert.cone.slope_deg: "),
+        ({"length_mm": 90}, "touches the wall"),
+    ]:
+        with pytest.raises(ConfigError, match=said):
+            study.simulation_case(design, "by_hand", 1)
+
+
+def test_stage_params_hold_their_own_settings_in_order():
+    study = config.parse({})
+    assert study.stage_params("gather") == {"factors": list(CENTRE), "incomplete": "refuse"}
+    assert study.stage_params("optimise")["bounds"]["length_mm"] == [30.0, 50.0]
+    assert study.stage_params("optimise")["centre"] == CENTRE
+    assert study.stage_params("verify")["cases"] == ["selected", "plan_centre", "bare"]
+    assert study.stage_params("train")["hidden_nodes"] == [3, 4, 5, 6, 7, 8, 9, 10]
+    for stage in config.STAGES:
+        params = study.stage_params(stage)
+        assert json.loads(json.dumps(params, sort_keys=True)) == params
+
+
+def test_profile_insert(tmp_path):
+    (tmp_path / "body.csv").write_text("r_mm,z_mm\n0,0\n10,0\n10,5\n0,20\n")
+    changes = {
+        "insert": {"shape": "profile", "profile": {"file": "body.csv"}},
+        "factors": {"height_mm": {"key": "insert.height_mm", "levels": [26, 28, 30, 32, 34]}},
+    }
+    study = config.parse(changes, tmp_path)
+    case = study.simulation_case({"height_mm": 30}, "exp_01", 1)
+    assert case["walls"]["insert"] == [[0, 0.03], [0.01, 0.03], [0.01, 0.035], [0, 0.05]]
+    params = study.derived_params("selected", 1)
+    assert config.derived_case(params, {"height_mm": 30})["walls"] == case["walls"]
+
+
+@pytest.mark.parametrize(
+    ("points", "said"),
+    [
+        ("0,0\n10,0\n-1,20\n", "crosses the axis"),
+        ("0,0\n10,0\n0,10\n5,15\n0,20\n", "crosses the axis"),
+        ("0,0\n10,10\n10,0\n0,10\n", "crosses or touches itself"),
+        ("0,0\n10,0\n5,0\n0,10\n", "crosses or touches itself"),
+        ("0,0\n10,0\n10,0\n0,10\n", "crosses or touches itself"),
+        ("1,0\n1,10\n", "a circle of radius 1 mm"),
+        ("0,5\n10,0\n0,20\n", "a circle of radius 0 mm"),
+        ("0,-40\n10,-40\n0,20\n", "touches the wall or lies beyond it"),
+        ("0,0\nx,0\n", "the columns r_mm, z_mm"),
+        ("0,0\n", "the columns r_mm, z_mm"),
+    ],
+)
+def test_profile_insert_that_cannot_be_used(tmp_path, points, said):
+    (tmp_path / "body.csv").write_text(f"r_mm,z_mm\n{points}")
+    changes = {
+        "insert": {"shape": "profile", "profile": {"file": "body.csv"}},
+        "factors": {"height_mm": {"key": "insert.height_mm", "levels": [26, 28, 30, 32, 34]}},
+    }
+    assert said in only(changes, tmp_path)
+
+
+def test_profile_without_points():
+    factors = {"height_mm": {"key": "insert.height_mm", "levels": [26, 28, 30, 32, 34]}}
+    line = only({"insert": {"shape": "profile"}, "factors": factors})
+    assert line.startswith("insert.profile.file: null is not allowed; allowed: a CSV file")
+    line = only({"insert": {"shape": "profile", "profile": {"file": "none.csv"}}, "factors": factors})
+    assert line.startswith("insert.profile.file: ") and "No such file" in line
+
+
+documents = st.recursive(
+    st.one_of(st.none(), st.integers(), st.text(max_size=2), st.lists(st.integers(), max_size=2)),
+    lambda inner: st.dictionaries(st.sampled_from("abc"), inner, max_size=3),
+    max_leaves=8,
+).filter(lambda value: isinstance(value, dict))
+
+
+@settings(deadline=None)
+@given(st.lists(documents, max_size=3))
+def test_files_merge_as_snakemake_merges(parts):
+    from snakemake.utils import update_config
+
+    expected, merged = {}, {}
+    for part in parts:
+        update_config(expected, json.loads(json.dumps(part)))
+        document.merge(merged, json.loads(json.dumps(part)))
+    assert merged == expected
+
+
+def test_files_are_read_as_snakemake_reads_them(tmp_path):
+    from snakemake.common.configfile import load_configfile
+    from snakemake.utils import update_config
+
+    (tmp_path / "a.yaml").write_text("filling: {level_mm: 70, particles: null}\nseed: 5e-4\nx: [1, 2]\n")
+    (tmp_path / "b.json").write_text('{"filling": {"particles": 900}, "x": [3]}')
+    paths = [tmp_path / "a.yaml", tmp_path / "b.json"]
+    expected = {}
+    for path in paths:
+        update_config(expected, load_configfile(path))
+    assert config.load(paths) == expected
+    assert config.load(paths, {"seed": 3})["seed"] == 3
+
+
+@pytest.mark.parametrize("text", ["a: [1", "- 1\n- 2", "", "a: 1\n\tb: 2", "d: 2024-13-45", "a: &a {b: *a}"])
+def test_file_that_is_no_configuration(tmp_path, text):
+    path = tmp_path / "config.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as refused:
+        config.load([path])
+    assert str(path) in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_missing_and_binary_files(tmp_path):
+    (tmp_path / "b.yaml").write_bytes(b"\xff\xfe\x00")
+    for name in ("a.yaml", "b.yaml"):
+        with pytest.raises(ConfigError, match=name):
+            config.load([tmp_path / name])
+
+
+def test_parsing_imports_no_slow_module():
+    slow = "{'scipy', 'sklearn', 'pymoo', 'matplotlib', 'numba', 'pandas', 'xarray', 'pydoe'}"
+    code = f"import sys; import hopperopt.config; print(sorted({slow} & set(sys.modules)))"
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert shown.strip() == "[]"
