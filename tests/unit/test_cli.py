@@ -1,0 +1,111 @@
+"""The command line: what it refuses and how it says so, and what a simulation by hand is."""
+
+import json
+
+import pytest
+import xarray as xr
+
+from hopperopt import cli, experiment, files, provenance
+
+
+@pytest.fixture
+def simulated(monkeypatch, tmp_path):
+    """Function that runs `simulate` with a solver that only writes down its case; returns case and file."""
+    cases = []
+
+    def run(case, progress=None):
+        cases.append(case)
+        return xr.Dataset({"status": ((), "jammed")}, attrs={"wall_time_s": 1.0})
+
+    monkeypatch.setattr(experiment, "run", run)
+    monkeypatch.setattr(provenance, "compile_solver", lambda: None)
+    monkeypatch.setattr(files, "stamp", {})
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "config.yaml").write_text("filling: {particles: 60}\n")
+
+    def simulate(*options):
+        assert cli.main(["simulate", *options, "--output", "out/run.nc"]) == 0
+        return cases[-1], files.read_netcdf(tmp_path / "out" / "run.nc")
+
+    return simulate
+
+
+def test_a_simulation_by_hand_has_the_design_that_was_typed(simulated):
+    case, run = simulated("--theta", "57.5", "--length", "45", "--factor", "height_mm=28", "--seed", "7")
+    assert case["design"] == {"theta_deg": 57.5, "length_mm": 45.0, "height_mm": 28.0}
+    assert case["walls"]["insert"][0] == [0.0, 0.028]
+    assert sum(case["particles"]["counts"]) == 60
+    assert case["seed"] == run.attrs["seed"] == 7
+    assert json.loads(run.attrs["case"]) == json.loads(json.dumps(case))
+    assert {"code_digest", "git", "versions", "host", "created", "wall_time_s"} <= set(run.attrs)
+
+
+def test_factors_that_are_not_typed_are_those_of_the_configuration(simulated, tmp_path):
+    (tmp_path / "more.yaml").write_text("insert: {cone: {length_mm: 32}}\n")
+    case, _ = simulated("--configfile", "config.yaml", "more.yaml", "--theta", "60")
+    assert case["design"] == {"theta_deg": 60.0, "length_mm": 32.0, "height_mm": 29.6}
+
+
+def test_the_bare_hopper_has_no_insert(simulated):
+    case, _ = simulated("--no-insert")
+    assert case["walls"]["insert"] is None and case["design"] == {}
+
+
+def test_a_jammed_simulation_is_a_result(simulated, capsys):
+    _, run = simulated()
+    assert run["status"] == "jammed"
+    assert "jammed" in capsys.readouterr().err
+
+
+def test_the_workflows_case_runs_as_it_is(simulated):
+    by_hand, _ = simulated("--theta", "60", "--seed", "3")
+    case, run = simulated("--case", json.dumps(by_hand | {"code": "0123"}), "--design")
+    assert case == json.loads(json.dumps(by_hand))
+    assert "0123" not in run.attrs["case"] and run.attrs["code_digest"] != "0123"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--theta", "steep"], "theta_deg: steep is not allowed; allowed: a number"),
+        (["--theta", "nan"], "insert.cone.slope_deg"),
+        (["--length", "90"], "insert"),
+        (["--factor", "width_mm=3"], "allowed: theta_deg, length_mm, height_mm"),
+        (["--factor", "theta_deg"], "allowed: NAME=VALUE"),
+        (["--no-insert", "--theta", "55"], "--no-insert goes without"),
+        (["--configfile", "missing.yaml"], "missing.yaml"),
+        (["--configfile", "config.yaml", "typo.yaml"], "filling.particels"),
+        (["--configfile", "broken.yaml"], "broken.yaml"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_status_2(tmp_path, monkeypatch, capsys, options, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "config.yaml").write_text("seed: 1\n")
+    (tmp_path / "typo.yaml").write_text("filling: {particels: 60}\n")
+    (tmp_path / "broken.yaml").write_text("filling: {particles: 60\n")
+    assert cli.main(["simulate", *options, "--output", "run.nc"]) == 2
+    message = capsys.readouterr().err
+    assert said in message and message.startswith("hopperopt: ")
+    assert message.count("\n") == 1
+    assert not (tmp_path / "run.nc").exists()
+
+
+def test_a_missing_input_and_bad_json_are_said_plainly(tmp_path, capsys):
+    output = ["--output", str(tmp_path / "training.nc")]
+    missing = ["--dataset", str(tmp_path / "dataset.nc"), *output]
+    assert cli.main(["filter", "--params", "{}", *missing]) == 2
+    assert "dataset.nc" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as stopped:
+        cli.main(["filter", "--params", "{", *missing])
+    assert stopped.value.code == 2
+    assert "no JSON" in capsys.readouterr().err
+
+
+def test_every_stage_and_figure_has_its_function():
+    """The command line names modules by text: each must exist, as must the function in it."""
+    for stage in cli.STAGES.values():
+        assert provenance.code_digest(f"hopperopt.{stage.module}")
+        module = cli.importlib.import_module(f"hopperopt.{stage.module}")
+        assert callable(getattr(module, stage.function))
+    for name in cli.FIGURES:
+        assert provenance.code_digest(f"hopperopt.figures.{name}")
