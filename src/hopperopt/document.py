@@ -79,7 +79,7 @@ def merge(document, override):
             below = document.get(key, {})
             if value and not isinstance(below, Mapping):
                 below = {}
-            document[key] = merge(below, value) if value else below
+            document[key] = merge(below, value)
         else:
             document[key] = value
     return document

@@ -412,12 +412,45 @@ def test_case_of_the_centre():
     count = sum(case["particles"]["counts"])
     assert 14_700 < count < 15_000
     fine, _, coarse = case["particles"]["diameters"]
-    assert case["filling"]["column_bottom"] == pytest.approx(0.079)
-    assert case["filling"]["column_radius"] == 0.05 - coarse / 2
     column = count / 3 * 3.141592653589793 / 6 * (fine**3 + 0.003**3 + coarse**3) / 0.2
     assert top[0] == 0.05
     assert top[1] == pytest.approx(0.079 + column / (3.141592653589793 * 0.048**2) + 0.02)
     assert json.loads(json.dumps(case)) == case
+
+
+def test_case_of_the_paper_is_in_si():
+    case = config.parse({}).simulation_case(CENTRE, "plan_centre", 1)
+    assert case["particles"] | {"counts": None} == {
+        "diameters": [0.002, 0.003, 0.004],
+        "counts": None,
+        "density": 2285,
+        "shear_modulus": 1e7,
+        "poisson_ratio": 0.25,
+    }
+    assert case["wall"] == {"shear_modulus": 2.2e7, "poisson_ratio": 0.25}
+    assert case["contact"] == {
+        "rolling": "edem",
+        "particle": {"static_friction": 0.5, "rolling_friction": 0.05, "restitution": 0.7},
+        "wall": {"static_friction": 0.5, "rolling_friction": 0.25, "restitution": 0.2},
+    }
+    assert case["filling"] == {
+        "level": 0.074,
+        "column_radius": 0.048,
+        "column_bottom": 0.079,
+        "solid_fraction": 0.2,
+        "speed": 0.5,
+        "speed_scatter": 0.05,
+        "settling_limit": 1.5,
+    }
+    assert case["discharge"] == {"sensor": -0.012, "idle_limit": 0.5, "time_limit": 10}
+    assert (case["time_step"], case["gravity"]) == (4e-5, 9.81)
+
+
+def test_rayleigh_time_and_automatic_step():
+    study = config.parse({"simulation": {"time_step_s": "auto"}})
+    assert study.particles.rayleigh_time == pytest.approx(5.18e-5, abs=0.005e-5)
+    step = study.simulation_case(CENTRE, "exp_01", 1)["time_step"]
+    assert step == pytest.approx(0.2 * study.particles.rayleigh_time, rel=1e-5)
 
 
 def test_column_starts_above_a_high_apex_and_above_the_cone():
