@@ -1,0 +1,1 @@
+"""The surrogate: from the simulated outflow curves to a network that predicts them for any design."""
