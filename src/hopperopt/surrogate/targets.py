@@ -37,49 +37,16 @@ def filter_targets(params: Mapping, dataset: str | os.PathLike, output: str | os
     low, high = clip_limits(targets.values, training, params["clip_sigma"])
     within = np.clip(targets.values, low[:, None], high[:, None])
     clipped = np.where(training, within, targets.values)
-
-    dimensions = ("experiment", "output", "M")
-    result = xr.Dataset(
-        {
-            "target": (
-                dimensions,
-                targets.values,
-                _described("simulated mass fraction, mean of the replicates"),
-            ),
-            "target_clipped": (
-                dimensions,
-                clipped,
-                _described("mass fraction to train on, clipped where training"),
-            ),
-            "clip_low": ("output", low, _described("lower limit of the clip")),
-            "clip_high": ("output", high, _described("upper limit of the clip")),
-            "moved": (
-                ("output", "M"),
-                (clipped != targets.values).sum(axis=0),
-                _described("number of training points moved by the clip"),
-            ),
-            "split": (("experiment", "M")[: labels.ndim], labels, {"long_name": "use of the data"}),
-            "target_fraction": (
-                "output",
-                data["target_fraction"].sel(size_class=list(OUTPUTS)).values,
-                _described("mass fraction in the batch"),
-            ),
-        },
-        coords={
-            "experiment": data["experiment"],
-            "output": list(OUTPUTS),
-            "M": data["M"],
-            **{name: data[name] for name in factors},
-        },
-        attrs={
-            "title": "targets of the surrogate",
-            "factors": " ".join(factors),
-            "split_by": params["split"],
-            "seed": params["seed"],
-            "clip_sigma": np.inf if params["clip_sigma"] is None else params["clip_sigma"],
-            "left_out": " ".join(left_out),
-        },
+    result = _training_set(data, targets.values, clipped, (low, high), labels).assign_coords(
+        {name: data[name] for name in factors}
     )
+    result.attrs |= {
+        "factors": " ".join(factors),
+        "split_by": params["split"],
+        "seed": params["seed"],
+        "clip_sigma": np.inf if params["clip_sigma"] is None else params["clip_sigma"],
+        "left_out": " ".join(left_out),
+    }
     write_netcdf(_with_objectives(result, within), output)
 
 
@@ -98,6 +65,26 @@ def clip_limits(
     mean = np.nanmean(used, axis=(0, 2))
     spread = np.nanstd(used, axis=(0, 2), ddof=1)
     return mean - sigma * spread, mean + sigma * spread
+
+
+def _training_set(data, targets, clipped, limits, labels):
+    """Dataset of targets (experiments, outputs, M), as simulated and clipped, the clip and the split."""
+    dimensions = ("experiment", "output", "M")
+    batch = data["target_fraction"].sel(size_class=list(OUTPUTS)).values
+    moved = (clipped != targets).sum(axis=0)
+    return xr.Dataset(
+        {
+            "target": (dimensions, targets, _described("simulated mass fraction, mean of the replicates")),
+            "target_clipped": (dimensions, clipped, _described("target, clipped where it trains")),
+            "clip_low": ("output", limits[0], _described("lower limit of the clip")),
+            "clip_high": ("output", limits[1], _described("upper limit of the clip")),
+            "moved": (dimensions[1:], moved, _described("number of training points moved by the clip")),
+            "split": (("experiment", "M")[: labels.ndim], labels, {"long_name": "use of the data"}),
+            "target_fraction": ("output", batch, _described("mass fraction in the batch")),
+        },
+        coords={"experiment": data["experiment"], "output": list(OUTPUTS), "M": data["M"]},
+        attrs={"title": "targets of the surrogate"},
+    )
 
 
 def _labels(params, data, factors):
