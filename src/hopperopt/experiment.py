@@ -152,7 +152,8 @@ class _Experiment:
             self.envelope.sample(self.positions(), gate_closed=True)
         self.filling_time = self.simulation.time
         self.position_opening = self.positions()
-        self.level = filling_level(self.position_opening, 0.5 * self.diameter, self.case)
+        contacts = self.simulation.contacts()
+        self.level = filling_level(self.position_opening, 0.5 * self.diameter, contacts, self.case)
 
     def height(self):
         """Height of the centre of mass, m."""

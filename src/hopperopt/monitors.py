@@ -99,15 +99,19 @@ class FlowPattern:
         return float(wall / axis) if axis else np.nan
 
 
-def filling_level(position, radius, case):
+def filling_level(position, radius, contacts, case):
     """Height of the bed's top, m: mean over ten rings of equal area of the highest sphere top.
 
-    Rings that the insert covers at the level asked for are left out, as are empty ones.
+    Spheres with fewer than two contacts are in flight and no part of the bed. Rings that the insert covers at
+    the level asked for are left out, as are empty ones.
+
+    Arguments: positions (n, 3) and radii (n,), m; contacts of each sphere (n,); the case.
     """
+    resting = contacts >= 2
+    position, tops = position[resting], (position[:, 2] + radius)[resting]
     cylinder = case["walls"]["hopper"][-1][0]
     covered = radius_at(case["walls"]["insert"], np.array([case["filling"]["level"]]))[0]
     edges = cylinder * np.sqrt(np.arange(LEVEL_RINGS + 1) / LEVEL_RINGS)
     ring = np.searchsorted(edges, np.hypot(position[:, 0], position[:, 1]), side="right") - 1
-    tops = position[:, 2] + radius
     heights = [tops[ring == k].max() for k in range(LEVEL_RINGS) if edges[k] >= covered and np.any(ring == k)]
     return float(np.mean(heights)) if heights else np.nan

@@ -74,7 +74,7 @@ def take_out(spheres, exit_time, counters, settings):
             continue
         late = (z - settings.sensor) / spheres.velocity[i, 2]  # time since the crossing
         exit_time[spheres.identity[i]] = counters[STEP] * settings.time_step - late
-        spheres.position[i, 2] = PARKED
+        spheres.position[i, 2] = PARKED - spheres.identity[i]  # a metre apart: they must not meet there
         for a in range(3):
             spheres.velocity[i, a] = 0.0
         spheres.skin[i] = math.inf

@@ -143,6 +143,16 @@ class Simulation:
         out[~left] = np.nan
         return out
 
+    def contacts(self):
+        """Number of contacts of each sphere in the last step, by identity, (n,) int."""
+        rows, spheres = self.rows, self.spheres
+        entries = np.flatnonzero(self.pairs.touching[: self.pairs.start[rows]])
+        owner = np.searchsorted(self.pairs.start[: rows + 1], entries, side="right") - 1
+        held = np.flatnonzero(self.touches.element[: self.touches.start[rows]] >= 0)
+        at_wall = np.searchsorted(self.touches.start[: rows + 1], held, side="right") - 1
+        touching = np.concatenate([owner, self.pairs.partner[entries], at_wall])
+        return np.bincount(spheres.identity[touching], minlength=len(self.exit_time))
+
     def wall_force(self, wall):
         """Force of the spheres on a wall in the last step, (3,) N."""
         return self.walls.force[self.wall_names.index(wall)].copy()
