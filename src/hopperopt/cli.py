@@ -59,7 +59,7 @@ FIGURES = {
     "curves": ("dataset",),
     "fit": ("training", "network"),
     "verification": ("simulations*", "network"),
-    "front": ("front",),
+    "front": ("front", "dataset", "summary"),
     "errors": ("errors",),
 }
 
@@ -69,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(level=logging.INFO, format="%(levelname)s: %(message)s", stream=sys.stderr)
     given = _parser().parse_args(arguments)
     try:
-        given.run(given)
+        given.action(given)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
@@ -113,7 +113,7 @@ def _add_stage(command: argparse.ArgumentParser, stage: Stage) -> None:
         count = {"nargs": "+"} if option.endswith("*") else {}
         command.add_argument(f"--{option.rstrip('*')}", required=True, metavar="FILE", **count)
     command.add_argument("--output", required=True, nargs=len(stage.outputs), metavar=stage.outputs)
-    command.set_defaults(run=_run_stage, stage=stage)
+    command.set_defaults(action=_run_stage, stage=stage)
 
 
 def _json(text: str) -> dict:
@@ -161,7 +161,7 @@ def _add_simulate(command: argparse.ArgumentParser) -> None:
     command.add_argument("--case", type=_json, metavar="JSON", help=argparse.SUPPRESS)
     command.add_argument("--design", nargs="*", default=[], metavar="YAML", help=argparse.SUPPRESS)
     command.add_argument("--output", type=Path, required=True, metavar="FILE", help="netCDF file to write")
-    command.set_defaults(run=_simulate)
+    command.set_defaults(action=_simulate)
 
 
 def _simulate(given: argparse.Namespace) -> None:

@@ -13,6 +13,8 @@ from hopperopt import files, outflow
 
 # What a run that did not end well cannot tell; its counts and monitors stay, to show what went wrong.
 RESULTS = ("discharge_time", "discharge_rate", "mass_flow_index")
+# Unit of a factor by the end of its name.
+UNITS = {"_deg": "degree", "_mm": "mm", "_kg_m3": "kg m-3", "_pa": "Pa", "_m_s": "m s-1", "_s": "s"}
 
 
 def gather(
@@ -20,7 +22,7 @@ def gather(
 ) -> None:
     """Write the plan's dataset (netCDF) and a table of its runs (CSV).
 
-    params: `factors`, unit of each factor, a column of the table `design`; `incomplete`, refuse or drop.
+    params: `factors`, names of columns of the table `design`; `incomplete`, refuse or drop.
     simulations: the runs' files, named EXPERIMENT_rep_REPLICATE.nc. Raises files.InputError naming the runs
     that did not end well, unless they are to be dropped: then they are NaN in the dataset.
     """
@@ -30,8 +32,6 @@ def gather(
         raise files.InputError(refusal(unusable))
     plan = files.read_table(design).set_index("experiment")[list(params["factors"])]
     dataset = assemble(plan, runs, unusable)
-    for name, unit in params["factors"].items():
-        dataset[name].attrs = {"long_name": f"factor {name}", "units": unit}
     files.write_netcdf(dataset, output)
     files.write_table(table_of_runs(dataset), table)
 
@@ -130,8 +130,16 @@ def _coordinates(plan: pd.DataFrame, replicates: list[int], target: np.ndarray) 
         "target_fraction": (
             "size_class", target, {"long_name": "mass fraction of the batch", "units": "1"}
         ),
-        **{name: ("experiment", plan[name].to_numpy(dtype=float)) for name in plan.columns},
+        **{
+            name: ("experiment", plan[name].to_numpy(dtype=float), _factor_attributes(name))
+            for name in plan.columns
+        },
     }  # fmt: skip
+
+
+def _factor_attributes(name: str) -> dict[str, str]:
+    unit = next((unit for suffix, unit in UNITS.items() if name.endswith(suffix)), "1")
+    return {"long_name": f"factor {name}", "units": unit}
 
 
 def _described(dataset: xr.Dataset, unusable: Mapping) -> xr.Dataset:

@@ -15,7 +15,7 @@ PLAN = pd.DataFrame(
         "length_mm_level": [1, 2, 3],
     }
 )
-PARAMS = {"factors": {"theta_deg": "degree", "length_mm": "mm"}, "incomplete": "refuse"}
+PARAMS = {"factors": ["theta_deg", "length_mm"], "incomplete": "refuse"}
 
 
 @pytest.fixture

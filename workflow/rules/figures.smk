@@ -81,9 +81,11 @@ rule figure_verification:
 
 
 rule figure_front:
-    """Pareto front with the selected point."""
+    """Pareto front with the selected point, among what was simulated."""
     input:
         front=result("optimum/front.csv"),
+        dataset=result("dataset.nc"),
+        summary=result("verification/summary.csv"),
     output:
         png=report(result("figures/front.png"), caption="../report/front.rst", category="Figures"),
         pdf=result("figures/front.pdf"),
@@ -97,6 +99,7 @@ rule figure_front:
         runtime=5,
     shell:
         "python -m hopperopt figure front --params {params.settings:q} --front {input.front:q} "
+        "--dataset {input.dataset:q} --summary {input.summary:q} "
         "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
 
 

@@ -1,0 +1,115 @@
+"""A tiny study, run once; its copies are changed in one thing and asked what would run again."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CLONE = Path(__file__).resolve().parents[2]
+SIMULATIONS = ("simulate", "verify_simulate")
+CONFIG = """\
+filling: {particles: 60}
+design: {plan: csv}
+surrogate:
+  hidden_nodes: [2, 3]
+  selected_hidden_nodes: 2
+  starts: 2
+  validation_experiments: 1
+  test_experiments: 1
+optimise: {population: 8, generations: 3}
+figures: {dpi: 50}
+"""
+# Both extremes of every factor twice: whatever two experiments are held out, or one level is changed.
+PLAN = """\
+experiment,theta_deg,length_mm,height_mm
+exp_01,60,50,34
+exp_02,50,30,26
+exp_03,60,50,34
+exp_04,50,30,26
+exp_05,55,40,29.6
+"""
+
+
+class Study:
+    """A directory with a study, and Snakemake in it."""
+
+    def __init__(self, directory, package=CLONE / "src"):
+        self.directory, self.package = directory, package
+        self.environment = {**os.environ, "PYTHONPATH": str(package)}
+
+    def snakemake(self, *options):
+        """Run Snakemake; return the completed process with its output as text."""
+        program = [sys.executable, "-m", "snakemake", "--snakefile", CLONE / "Snakefile"]
+        return subprocess.run(
+            [*program, "--directory", self.directory, "--cores", "2", *options],
+            env=self.environment,
+            cwd=self.directory,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            check=False,
+        )
+
+    def planned(self, *options):
+        """Names of the jobs that a dry run plans: the rule, for a simulation its run as well."""
+        answer = self.snakemake("--dry-run", *options)
+        assert answer.returncode == 0, answer.stdout
+        jobs = re.findall(r"^(?:local)?rule (\w+):\n((?:    .*\n)*)", answer.stdout, re.MULTILINE)
+        outputs = [(rule, re.search(r"output: \S*/(\S+)\.nc", block)) for rule, block in jobs]
+        return {f"{rule} {found[1]}" if rule in SIMULATIONS else rule for rule, found in outputs} - {"all"}
+
+    def edit(self, name, old, new):
+        """Replace text in a file of the study."""
+        replace(self.directory / name, old, new)
+
+
+def replace(path, old, new):
+    """Replace text that stands once in a file."""
+    text = path.read_text()
+    assert text.count(old) == 1, f"{old!r} is {text.count(old)} times in {path}"
+    path.write_text(text.replace(old, new))
+
+
+@pytest.fixture(scope="session")
+def new_study():
+    """Function that makes a study of a directory and the text of its configuration."""
+
+    def make(directory, config):
+        (directory / "config.yaml").write_text(config)
+        return Study(directory)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory, new_study):
+    """The tiny study after its one run; not to be changed."""
+    directory = tmp_path_factory.mktemp("study")
+    (directory / "plan.csv").write_text(PLAN)
+    study = new_study(directory, CONFIG)
+    answer = study.snakemake()
+    assert answer.returncode == 0, answer.stdout
+    return study
+
+
+@pytest.fixture
+def study(finished, tmp_path):
+    """A copy of the finished study."""
+    shutil.copytree(finished.directory, tmp_path / "study")
+    return Study(tmp_path / "study")
+
+
+@pytest.fixture
+def edited(study, tmp_path):
+    """Function that returns the copied study with a copy of the package in which one text is replaced."""
+
+    def edit(module, old, new):
+        shutil.copytree(CLONE / "src", tmp_path / "src")
+        replace(tmp_path / "src" / "hopperopt" / module, old, new)
+        return Study(study.directory, tmp_path / "src")
+
+    return edit
