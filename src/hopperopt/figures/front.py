@@ -1,0 +1,156 @@
+"""The Pareto front, the design selected from it, and what simulations say."""
+
+import os
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from matplotlib.figure import Figure
+
+from hopperopt import files, outflow
+from hopperopt.figures import style
+from hopperopt.surrogate import features
+
+SIGMAS = 1.64  # intervals of 90 %
+COLUMNS = ["J_fine", "J_intermediate"]
+NETWORK = "#009E73"
+FRONT = {"color": NETWORK, "marker": "o", "markersize": 1.8, "linewidth": 0.7}
+SELECTED = {"color": NETWORK, "marker": "*", "markersize": 8}
+IMPOSSIBLE = {"color": NETWORK, "marker": "o", "markersize": 2.5, "markerfacecolor": "none"}
+PREDICTED = {"color": NETWORK, "marker": "o", "markersize": 3.5}
+SIMULATED = {"color": style.INK, "marker": "D", "markersize": 4, "markerfacecolor": "white"}
+PLAN = {"color": "#909090", "marker": "o", "markersize": 2.8, "markerfacecolor": "none"}
+ARROW = {"arrowstyle": "->", "linewidth": 0.6, "color": style.INK, "shrinkB": 3}
+
+
+def write(
+    params: Mapping,
+    front: str | os.PathLike,
+    dataset: str | os.PathLike,
+    summary: str | os.PathLike,
+    outputs: Sequence[str | os.PathLike],
+) -> None:
+    """Draw the front; params: `dpi`; front, dataset, summary: paths of front.csv, dataset.nc, summary.csv."""
+    tables = files.read_table(front), files.read_netcdf(dataset), files.read_table(summary)
+    style.save(draw(*tables), outputs, params["dpi"])
+
+
+@style.styled
+def draw(front: pd.DataFrame, dataset: xr.Dataset, summary: pd.DataFrame) -> Figure:
+    """Draw J_i over J_f: the front as predicted, and the same among the simulations.
+
+    front: columns J_fine, J_intermediate, feasible, selected and the factors; dataset: the plan's
+    experiments; summary: a row per verification case and objective. Simulated objectives are
+    sign(U) sqrt|U|, below zero where a curve departs less from the batch than counting noise does on average.
+    An arrow leads from a case's prediction to its simulation; bars are intervals of 90 % in counting noise.
+    """
+    figure = style.page(style.PAGE, 78)
+    near, far = style.panels(figure, 1, 2, style.Frame(15, 3.5, 8.5, 10), (17, 0))[0]
+    for panel, title in ((near, "predicted by the network"), (far, "simulated, counting noise subtracted")):
+        panel.set(xlabel=style.OBJECTIVES["fine"], ylabel=style.OBJECTIVES["intermediate"])
+        panel.set_title(title, loc="left")
+        panel.locator_params(nbins=6)
+        _draw_front(panel, front)
+    _label_selected(near, front)
+    _draw_simulated(far, front, plan_objectives(dataset), summary)
+    style.key(figure, _meanings(front), (2, 77))
+    return figure
+
+
+def _meanings(front):
+    """What lines and marks mean, see style.key."""
+    marks = {"prediction of a case": PREDICTED, "case, simulated": SIMULATED, "plan, simulated": PLAN}
+    if not front["feasible"].all():
+        marks = {"impossible mass fractions": IMPOSSIBLE, **marks}
+    if front["selected"].any():
+        marks = {"selected": SELECTED, **marks}
+    return {"front": FRONT, **{text: {"linestyle": "", **look} for text, look in marks.items()}}
+
+
+def _draw_front(panel, front):
+    points = front[COLUMNS].to_numpy(float)
+    feasible, selected = (front[name].to_numpy(bool) for name in ("feasible", "selected"))
+    panel.plot(*points[feasible].T, **FRONT)
+    panel.plot(*points[~feasible].T, linestyle="", **IMPOSSIBLE)
+    panel.plot(*points[selected].T, linestyle="", zorder=4, **SELECTED)
+
+
+def _label_selected(panel, front):
+    """Write the selected design beside its point, if it is one of the front's."""
+    for _, row in front[front["selected"].astype(bool)].iterrows():
+        design = {name: row[name] for name in front.columns if name not in (*COLUMNS, "feasible", "selected")}
+        text = style.design_text(design).replace(", ", "\n")
+        style.label_points(panel, {text: tuple(row[COLUMNS])}, _along(front[COLUMNS].to_numpy(float)))
+
+
+def _draw_simulated(panel, front, plan, summary):
+    """Draw the plan's experiments and the verification cases, with labels."""
+    for line in (panel.axhline, panel.axvline):
+        line(0, color=style.FAINT, linewidth=0.5, zorder=0)
+    panel.plot(*plan, linestyle="", zorder=1, **PLAN)
+    labels, lines = {}, [plan.T, _along(front[COLUMNS].to_numpy(float))]
+    panel.autoscale_view()
+    lines += [_along([(x, 0) for x in panel.get_xlim()]), _along([(0, y) for y in panel.get_ylim()])]
+    for case in dict.fromkeys(summary["case"]):
+        rows = summary[summary["case"] == case].set_index("objective").loc[list(features.OUTPUTS)]
+        simulated = rows["simulated_J_corrected"].to_numpy()
+        if np.isfinite(simulated).all():
+            labels[case.replace("_", " ")] = tuple(simulated)
+            lines += _draw_case(panel, rows)
+    style.label_points(panel, labels, np.vstack(lines))
+
+
+def _draw_case(panel, rows):
+    """Draw prediction and simulation of a case; return points (n, 2) along each line drawn."""
+    simulated = rows["simulated_J_corrected"].to_numpy()
+    (left, bottom), (right, top) = interval(simulated, rows["counting_floor"].to_numpy())
+    x, y = simulated
+    panel.plot(x, y, zorder=3, **SIMULATED)
+    lines = [[(left, y), (right, y)], [(x, bottom), (x, top)]]
+    for line in lines:
+        panel.plot(*np.transpose(line), color=SIMULATED["color"], linewidth=0.5, zorder=2)
+    predicted = rows["predicted_J"].to_numpy()
+    if np.isfinite(predicted).all():
+        panel.plot(*predicted, zorder=2, **PREDICTED)
+        panel.annotate("", simulated, predicted, zorder=2, arrowprops=ARROW)
+        lines.append([predicted, simulated])
+    return [_along(line) for line in lines]
+
+
+def _along(line):
+    """Points (n, 2) closely along a line through given points (m, 2)."""
+    line = np.asarray(line, float)
+    at = np.linspace(0, len(line) - 1, 50 * len(line))
+    return np.column_stack([np.interp(at, np.arange(len(line)), values) for values in line.T])
+
+
+def interval(corrected: np.ndarray, floor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Limits, as signed roots, of an interval that holds nine of ten corrected squares in counting noise.
+
+    corrected: sign(U) sqrt|U|; floor: counting noise sqrt(mean s^2) of what U comes from. The variance of U
+    is [4 sum d^2 s^2 + 2 sum s^4] / n^2 over the n windows, d^2 being the squares without noise; here every
+    window has the mean s^2 and d^2.
+    """
+    square = np.sign(corrected) * corrected**2
+    variance = (4 * np.maximum(square, 0) * floor**2 + 2 * floor**4) / outflow.GRID.size
+    return tuple(outflow.signed_root(square + sign * SIGMAS * np.sqrt(variance)) for sign in (-1, 1))
+
+
+def plan_objectives(dataset: xr.Dataset) -> np.ndarray:
+    """Corrected objectives sign(U) sqrt|U| of the plan's experiments, (output, experiment).
+
+    The noise taken off is the counting variance where one run is complete, and the scatter between the runs
+    otherwise.
+    """
+    data = dataset.sel(size_class=list(features.OUTPUTS))
+    runs = data["mass_fraction"].notnull().all(("size_class", "M")).sum("replicate")
+    scatter = data["mass_fraction"].var("replicate", ddof=1) / runs
+    noise = xr.where(runs > 1, scatter, data["counting_variance"].mean("replicate"))
+    order = ("size_class", "experiment", "M")
+    square = outflow.corrected_square(
+        data["mass_fraction"].mean("replicate").transpose(*order).values,
+        data["target_fraction"].values[:, None],
+        noise.transpose(*order).values,
+    )
+    return outflow.signed_root(square)

@@ -1,0 +1,185 @@
+"""The hopper with its particles, before and during the discharge, cut open in two directions (figure 2)."""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Polygon
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
+
+from hopperopt import files, outflow
+from hopperopt.figures import spheres, style
+from hopperopt.geometry import is_solid
+
+PER_M = 1000.0  # millimetres
+WIDTH = 130.0  # mm in print
+MARGIN = 4.0  # mm of the hopper, beside it
+# Axes to the right, up and away from the eye, and the sign of the last.
+SIDES = {"front view": ([0, 2, 1], 1, "x"), "side view": ([1, 2, 0], -1, "y")}
+COLOURS = style.COLOURS | {"coarse": "#C4C4C4"}
+WALL, SECTION, INSIDE = "#4D4D4D", "#E4E4E4", "#F4F4F4"
+
+
+def write(params: Mapping, run: str | os.PathLike, outputs: Sequence[str | os.PathLike]) -> None:
+    """Draw a run; params: `dpi`; run: the run's netCDF file; outputs: paths, PNG or PDF."""
+    style.save(draw(files.read_netcdf(run)), outputs, params["dpi"])
+
+
+@style.styled
+def draw(run: xr.Dataset) -> Figure:
+    """Draw four views of one run: at the opening and at M = 0.5, from the front and from the side.
+
+    The particles whose centres lie behind the cut, a plane through the axis, are shown. Heights and widths
+    are in mm, particles at true scale.
+    """
+    case = json.loads(run.attrs["case"])
+    walls = {name: PER_M * np.array(w, float) for name, w in case["walls"].items() if w is not None}
+    moments = {
+        "before the discharge": PER_M * run["position_opening"].values,
+        _half_way(run): PER_M * run["position_half"].values,
+    }
+    sensor = PER_M * case["discharge"]["sensor"]
+    limits = _limits(walls, PER_M * run["position_opening"].values, sensor)
+    frame = style.Frame(left=11, right=1, bottom=19, top=5)
+    gaps = (3.0, 6.0)
+    scale = (WIDTH - frame.left - frame.right - gaps[0]) / 2 / (limits[1] - limits[0])
+    height = scale * (limits[3] - limits[2])
+    figure = style.page(WIDTH, frame.bottom + 2 * height + gaps[1] + frame.top)
+    axes = style.panels(figure, 2, 2, frame, gaps, sharex=True, sharey=True)
+    for row, (moment, position) in zip(axes, moments.items(), strict=True):
+        for panel, side in zip(row, SIDES, strict=True):
+            _draw_walls(panel, walls)
+            _draw_particles(panel, run, position, side, limits, scale)
+            panel.set_title(f"{side}, {moment}", loc="left")
+    _finish_axes(axes, limits)
+    for panel in axes[0]:
+        panel.plot(*_mirrored(walls["gate"]), color=WALL, linewidth=1.2, zorder=3)
+    for panel in axes[1]:
+        outlet = walls["gate"][:, 0].max()
+        panel.plot([-outlet, outlet], [sensor, sensor], color=WALL, linewidth=0.7, linestyle=":", zorder=3)
+    _draw_dimensions(axes[0, 0], walls, limits)
+    _draw_key(figure, case, scale)
+    return figure
+
+
+def _half_way(run):
+    """Words for the moment at which half of the mass had left."""
+    if run["position_half"].isnull().all():
+        return "never half discharged"
+    order = np.argsort(run["exit_time"].values)
+    mass = np.cumsum(run["diameter"].values[order] ** 3)
+    # NaN, what never left, comes last.
+    moment = run["exit_time"].values[order][np.searchsorted(mass, 0.5 * mass[-1])]
+    return f"at $M$ = 0.5, after {moment:.2f} s"
+
+
+def _limits(walls, position, sensor):
+    """Left, right, bottom and top (mm) of what is shown: particles, insert, and the way to the sensor."""
+    widest = walls["hopper"][:, 0].max() + MARGIN
+    top = np.nanmax(position[:, 2])
+    if "insert" in walls:
+        top = max(top, walls["insert"][:, 1].max())
+    return -widest, widest, sensor - 2 * MARGIN, top + 3 * MARGIN
+
+
+def _mirrored(profile):
+    """A profile and its mirror image as one line, from the axis outwards on either side."""
+    r, z = profile.T
+    return np.concatenate([-r[::-1], r]), np.concatenate([z[::-1], z])
+
+
+def _draw_walls(axes: Axes, walls: Mapping) -> None:
+    """Draw where the cut meets hopper and insert."""
+    axes.add_patch(
+        Polygon(np.column_stack(_mirrored(walls["hopper"])), facecolor=INSIDE, edgecolor="none", zorder=0)
+    )
+    sides = np.array([[-1, 1], [1, 1]])
+    for side in sides:
+        axes.plot(*(walls["hopper"] * side).T, color=WALL, linewidth=1.2, zorder=3)
+    if "insert" not in walls:
+        return
+    profile = walls["insert"]
+    if is_solid(profile):
+        closed = np.array_equal(profile[0], profile[-1])
+        sections = [profile * side for side in sides] if closed else [np.column_stack(_mirrored(profile))]
+        for section in sections:
+            axes.add_patch(Polygon(section, facecolor=SECTION, edgecolor="none", zorder=3))
+    for side in sides:
+        axes.plot(*(profile * side).T, color=WALL, linewidth=1.0, zorder=4)
+
+
+def _draw_particles(axes: Axes, run, position, side, limits, scale) -> None:
+    order, sign, _ = SIDES[side]
+    centre = position[:, order] * [1, 1, sign]
+    # NaN, a particle that has left, compares as false.
+    shown = centre[:, 2] >= 0
+    colours = np.array([to_rgb(COLOURS[name]) for name in outflow.SIZE_CLASSES])
+    image = spheres.render(
+        centre[shown],
+        PER_M * run["diameter"].values[shown] / 2,
+        colours[run["size_class"].values[shown]],
+        spheres.View(*limits, resolution=scale * style.MM * style.IMAGE_DPI),
+        depth=limits[1],
+    )
+    axes.imshow(image, extent=limits, zorder=2, aspect="auto")
+
+
+def _finish_axes(axes, limits):
+    for panel in axes[:, 0]:
+        panel.set_ylabel("height $z$ / mm")
+    for panel, (_, _, name) in zip(axes[1], SIDES.values(), strict=True):
+        panel.set_xlabel(f"${name}$ / mm")
+    for panel in axes.flat:
+        panel.set_xlim(limits[:2])
+        panel.set_ylim(limits[2:])
+        panel.xaxis.set_major_locator(MaxNLocator(5))
+        panel.yaxis.set_major_locator(MaxNLocator(6))
+
+
+def _draw_dimensions(axes: Axes, walls: Mapping, limits: Sequence[float]) -> None:
+    """Draw the diameters of outlet and cylinder and the height of the insert (mm)."""
+    outlet, widest = walls["gate"][:, 0].max(), walls["hopper"][:, 0].max()
+    above, below = limits[3] - 2 * MARGIN, -1.5 * MARGIN
+    _dimension(axes, (-widest, above), (widest, above), f"⌀ {2 * widest:.3g} mm", (0, 1), "bottom")
+    _dimension(axes, (-outlet, below), (outlet, below), f"⌀ {2 * outlet:.3g} mm", (0, -1), "top")
+    if "insert" in walls:
+        height = walls["insert"][:, 1].min()
+        _dimension(axes, (0, 0), (0, height), f"{height:.3g} mm", (2, 0), "center")
+
+
+def _dimension(axes, start, end, text, offset, align):
+    """Draw a line with arrow heads at both ends, and its length beside the middle."""
+    halo = [withStroke(linewidth=1.8, foreground="white")]
+    arrow = {"arrowstyle": "<|-|>,head_length=0.3,head_width=0.12", "color": style.INK, "linewidth": 0.6}
+    line = axes.annotate("", end, start, zorder=6, arrowprops={**arrow, "shrinkA": 0, "shrinkB": 0})
+    line.arrow_patch.set_path_effects(halo)
+    axes.annotate(
+        text,
+        ((start[0] + end[0]) / 2, (start[1] + end[1]) / 2),
+        offset,
+        textcoords="offset points",
+        ha="left" if offset[0] else "center",
+        va=align,
+        zorder=6,
+        path_effects=halo,
+    )
+
+
+def _draw_key(figure: Figure, case: Mapping, scale: float) -> None:
+    """Draw one particle of each size at true scale with its name, and the design in words, at the bottom."""
+    width, height = style.size(figure)
+    axes = figure.add_axes((0, 0, 1, 10 / height), xlim=(0, width), ylim=(0, 10))
+    axes.set_axis_off()
+    axes.text(11, 2.2, style.design_text(case["design"]), va="center_baseline")
+    left = 11.0
+    for name, diameter in zip(outflow.SIZE_CLASSES, case["particles"]["diameters"], strict=True):
+        radius = scale * PER_M * diameter / 2
+        axes.add_patch(Circle((left + radius, 7), radius, facecolor=COLOURS[name], edgecolor="none"))
+        text = axes.text(left + 2 * radius + 1, 7, f"{name}, {PER_M * diameter:.3g} mm", va="center_baseline")
+        left = axes.transData.inverted().transform_bbox(text.get_window_extent()).x1 + 3

@@ -1,0 +1,333 @@
+"""Figures show what they should, their texts can be read, and drawing them again gives the same files."""
+
+import inspect
+import itertools
+import json
+import math
+from unittest import mock
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from matplotlib.colors import to_rgb
+from matplotlib.text import Text
+
+from hopperopt import cli, dataset, outflow
+from hopperopt.figures import curves, errors, fit, front, hopper, spheres, style, verification
+from hopperopt.surrogate import targets
+
+BATCH = np.array([8, 27, 64]) / 99
+FACTORS = {"theta_deg": (50.0, 60.0), "length_mm": (30.0, 50.0), "height_mm": (26.0, 34.0)}
+CASE = {
+    "walls": {
+        "hopper": [[0.0225, 0], [0.05, 0.0275], [0.05, 0.2]],
+        "gate": [[0, 0], [0.0225, 0]],
+        "insert": [[0, 0.0296], [0.02, 0.0296], [0, 0.06]],
+    },
+    "particles": {"diameters": [0.002, 0.003, 0.004]},
+    "discharge": {"sensor": -0.012},
+    "design": {"theta_deg": 55.0, "length_mm": 40.0, "height_mm": 29.6},
+}
+
+
+@pytest.fixture
+def make_plan(make_run):
+    """Function that returns a plan's data set, without segregation, of so many experiments."""
+
+    def plan(experiments=25, replicates=1, factors=3, count=400, dropped=()):
+        rng = np.random.default_rng(3)
+        names = [f"exp_{n:02d}" for n in range(1, experiments + 1)]
+        columns = dict(
+            itertools.islice((FACTORS | dict.fromkeys(("friction", "b", "c"), (0, 1))).items(), factors)
+        )
+        values = {name: rng.uniform(*limits, experiments).round(2) for name, limits in columns.items()}
+        runs = {
+            (name, r): make_run(count, seed=100 * n + r)
+            for n, name in enumerate(names)
+            for r in range(1, replicates + 1)
+        }
+        table = pd.DataFrame(values, index=pd.Index(names, name="experiment"))
+        return dataset.assemble(table, runs, dict.fromkeys(dropped, "jammed"))
+
+    return plan
+
+
+@pytest.fixture
+def make_training(make_plan, tmp_path):
+    """Function that returns the training data of a plan, and smooth curves as a network's."""
+
+    def training(split="experiments", **plan):
+        data = make_plan(**plan)
+        data.to_netcdf(tmp_path / "dataset.nc")
+        factors = [
+            name for name, c in data.coords.items() if c.dims == ("experiment",) and name != "experiment"
+        ]
+        params = {"factors": factors, "clip_sigma": 2.0, "split": split, "seed": 1}
+        held_out = {"validation_experiments": 1, "test_experiments": 1}
+        targets.filter_targets(params | held_out, tmp_path / "dataset.nc", tmp_path / "training.nc")
+        result = xr.load_dataset(tmp_path / "training.nc")
+        return result, result["target"].mean("M").values[..., None] + 0.02 * np.sin(outflow.GRID)
+
+    return training
+
+
+@pytest.fixture
+def run():
+    """A few particles around the insert's cone, one of which has left when half of the mass has."""
+    rng = np.random.default_rng(1)
+    size_class = np.arange(60) % 3
+    radius, angle = rng.uniform(0.025, 0.045, 60), rng.uniform(0, 2 * np.pi, 60)
+    position = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), rng.uniform(0.03, 0.07, 60)])
+    half = np.where(np.arange(60)[:, None] == 0, np.nan, position)
+    return xr.Dataset(
+        {
+            "exit_time": ("particle", np.linspace(0.1, 1.1, 60)),
+            "diameter": ("particle", np.array([0.002, 0.003, 0.004])[size_class]),
+            "size_class": ("particle", size_class),
+            "position_opening": (("particle", "xyz"), position),
+            "position_half": (("particle", "xyz"), half),
+        },
+        attrs={"case": json.dumps(CASE)},
+    )
+
+
+def table_of_errors(**columns):
+    rng = np.random.default_rng(2)
+    sizes = np.arange(3, 11)
+    names = [f"{use}_rmse_{name}" for use in ("training", "validation", "test") for name in style.OBJECTIVES]
+    empty = {f"cross_validation_rmse_{name}": np.nan for name in style.OBJECTIVES}
+    values = {name: rng.uniform(0.01, 0.012, 8) for name in names}
+    return pd.DataFrame({"hidden": sizes, **values, **empty, **columns, "selected": sizes == 7})
+
+
+def table_of_front(points=30, feasible=True, selected=9):
+    J = np.linspace(0.004, 0.012, points)
+    designs = {name: np.linspace(*limits, points) for name, limits in FACTORS.items()}
+    marks = {"feasible": feasible, "selected": np.arange(points) == selected}
+    return pd.DataFrame({**designs, "J_fine": J, "J_intermediate": 6e-5 / J, **marks})
+
+
+def table_of_cases(simulated=(0.006, 0.009), floor=(0.0065, 0.0177)):
+    rows = [
+        (case, name, predicted, value + shift, noise)
+        for case, predicted, shift in (
+            ("selected", 0.006, 0),
+            ("plan_centre", 0.012, 0.008),
+            ("bare", None, 0.02),
+        )
+        for name, value, noise in zip(style.OBJECTIVES, simulated, floor, strict=True)
+    ]
+    return pd.DataFrame(
+        rows, columns=["case", "objective", "predicted_J", "simulated_J_corrected", "counting_floor"]
+    )
+
+
+def written(figure):
+    """Texts that are drawn in a figure, with their boxes in pixels."""
+    drawn, draw = [], Text.draw
+    with mock.patch.object(Text, "draw", lambda text, renderer: (drawn.append(text), draw(text, renderer))):
+        figure.canvas.draw()
+    return [
+        (text, text.get_window_extent()) for text in drawn if text.get_visible() and text.get_text().strip()
+    ]
+
+
+def check_texts(figure):
+    """No text is small, cut off, or upon another; the figure has a width that columns in print have."""
+    assert style.size(figure)[0] <= style.PAGE + 0.01
+    texts = written(figure)
+    assert texts
+    page = figure.bbox
+    for text, box in texts:
+        assert text.get_fontsize() >= 7, text
+        inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
+        assert inside, f"{text} is cut off"
+    for (first, a), (second, b) in itertools.combinations(texts, 2):
+        overlap = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
+        assert min(overlap) < 1, f"{first} lies upon {second}"
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [
+        {},
+        {"experiments": 1, "count": 100},
+        {"experiments": 7, "replicates": 2, "factors": 6},
+        {"experiments": 12, "dropped": [("exp_04", 1)]},
+    ],
+)
+def test_curves_can_be_read_for_any_number_of_experiments(make_plan, plan):
+    figure = curves.draw(make_plan(**plan))
+    check_texts(figure)
+    assert len(figure.axes) == plan.get("experiments", 25)
+    assert sum(text.get_text() == "no complete run" for text, _ in written(figure)) == len(
+        plan.get("dropped", ())
+    )
+
+
+@pytest.mark.parametrize("split", ["experiments", "points"])
+@pytest.mark.parametrize("plan", [{}, {"experiments": 10, "factors": 1, "count": 100}])
+def test_fit_can_be_read_and_tells_what_did_not_train(make_training, split, plan):
+    training, predicted = make_training(split, **plan)
+    figure = fit.draw(training, predicted)
+    check_texts(figure)
+    words = [text.get_text() for text, _ in written(figure)]
+    assert words.count("validation") == words.count("test") == 1
+    if split == "experiments":
+        panel = next(axes for axes in figure.axes if "test" in [text.get_text() for text in axes.texts])
+        tested = training["experiment"].values[training["split"].values == "test"].item()
+        assert panel.get_title(loc="left") == str(int(tested.removeprefix("exp_")))
+
+
+def test_fit_shows_what_the_clip_moved(make_training):
+    training, predicted = make_training()
+    figure = fit.draw(training, predicted)
+    crosses = [line for axes in figure.axes for line in axes.lines if line.get_marker() == "x"]
+    shown = np.sort(np.concatenate([line.get_ydata() for line in crosses]))
+    moved = training["target"].values[training["target"].values != training["target_clipped"].values]
+    assert len(moved) > 0
+    np.testing.assert_array_equal(shown, np.sort(moved))
+
+
+@pytest.mark.parametrize("replicates", [0, 1, 3])
+def test_verification_can_be_read(make_run, replicates):
+    runs = [make_run(seed=seed) for seed in range(replicates)]
+    figure = verification.draw(runs, CASE["design"], BATCH[:2], np.repeat(BATCH[:2, None], 21, axis=1))
+    check_texts(figure)
+    check_texts(verification.draw(runs, {}, BATCH[:2], None))
+
+
+def test_nine_of_ten_points_lie_in_the_band_around_a_right_prediction(make_run):
+    inside = []
+    for seed in range(30):
+        figure = verification.draw(
+            [make_run(2000, seed)], CASE["design"], BATCH[:2], np.repeat(BATCH[:2, None], 21, 1)
+        )
+        axes = figure.axes[0]
+        simulated = [line.get_ydata() for line in axes.lines if line.get_markerfacecolor() == "none"]
+        for points, band in zip(simulated, axes.collections, strict=True):
+            corners = band.get_paths()[0].vertices
+            limits = [corners[np.isclose(corners[:, 0], M), 1] for M in outflow.GRID]
+            inside += [low.min() <= y <= low.max() for low, y in zip(limits, points, strict=True)]
+    assert np.mean(inside) == pytest.approx(0.9, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("found", "cases"),
+    [
+        (table_of_front(), table_of_cases()),
+        (table_of_front(1, selected=0), table_of_cases((-0.01, -0.03), (0.026, 0.072))),
+        (table_of_front(5, feasible=False, selected=-1), table_of_cases((np.nan, np.nan))),
+    ],
+)
+def test_front_can_be_read(make_plan, found, cases):
+    figure = front.draw(found, make_plan(10), cases)
+    check_texts(figure)
+    words = {text.get_text() for text, _ in written(figure)}
+    if cases["simulated_J_corrected"].notna().all():
+        assert {"plan centre", "bare", "selected"} <= words
+
+
+def test_a_plan_without_segregation_has_objectives_around_zero(make_plan):
+    for replicates in (1, 3):
+        plan = make_plan(60, replicates, count=300)
+        corrected = front.plan_objectives(plan)
+        square = np.mean(np.sign(corrected) * corrected**2, axis=1)
+        raw = (plan["J"].isel(size_class=[0, 1], replicate=0) ** 2).mean("experiment").values
+        assert (np.abs(square) < 0.12 * raw).all()
+
+
+def test_objectives_of_the_plan_use_what_runs_there_are(make_plan):
+    objectives = front.plan_objectives(make_plan(4, 2, dropped=[("exp_02", 2), ("exp_03", 1), ("exp_03", 2)]))
+    assert np.isfinite(objectives).all(axis=0).tolist() == [True, True, False, True]
+
+
+def test_the_interval_covers_nine_of_ten():
+    rng = np.random.default_rng(4)
+    noise = 0.0065
+    departure = 0.01 * np.sin(np.linspace(0, 3, 21))
+    square = np.mean((departure + noise * rng.normal(size=(4000, 21))) ** 2, axis=1) - noise**2
+    low, high = front.interval(outflow.signed_root(square), np.full(4000, noise))
+    true = math.sqrt(np.mean(departure**2))
+    assert np.mean((low <= true) & (true <= high)) == pytest.approx(0.9, abs=0.03)
+
+
+def test_errors_can_be_read():
+    check_texts(errors.draw(table_of_errors()))
+    check_texts(errors.draw(table_of_errors(cross_validation_rmse_fine=0.011)))
+    check_texts(errors.draw(table_of_errors().iloc[:1]))
+
+
+def test_hopper_can_be_read(run):
+    for insert in ("insert", "none"):
+        case = json.loads(run.attrs["case"])
+        if insert == "none":
+            case["walls"]["insert"], case["design"] = None, {}
+        check_texts(hopper.draw(run.assign_attrs(case=json.dumps(case))))
+    never = run.assign(position_half=run["position_half"] * np.nan)
+    assert any("never" in text.get_text() for text, _ in written(hopper.draw(never)))
+
+
+def test_hopper_shows_the_particles_behind_the_cut_at_their_place(run):
+    pair = run.isel(particle=[0, 2])
+    pair["position_opening"][:] = [[0.03, 0.01, 0.05], [-0.03, -0.01, 0.05]]
+    figure = hopper.draw(pair)
+    for panel, seen, place in ((0, 0, 30), (1, 1, -10)):
+        picture = figure.axes[panel].images[0]
+        left, right, bottom, top = picture.get_extent()
+        image = picture.get_array()
+        rows, columns = np.nonzero(image[..., 3] > 0.5)
+        x = left + (columns.mean() + 0.5) / image.shape[1] * (right - left)
+        z = top - (rows.mean() + 0.5) / image.shape[0] * (top - bottom)
+        assert (x, z) == pytest.approx((place, 50), abs=0.3)
+        covered = len(rows) * (right - left) * (top - bottom) / image[..., 3].size
+        assert covered == pytest.approx(math.pi * (500 * pair["diameter"].values[seen]) ** 2, rel=0.1)
+
+
+def test_the_nearest_sphere_is_seen():
+    view = spheres.View(-2, 2, -2, 2, resolution=20)
+    red, blue = np.array(to_rgb("red")), np.array(to_rgb("blue"))
+    for depths, top in (((0, 1), 0), ((1, 0), 2)):
+        centre = np.array([[0, 0, depths[0]], [0.5, 0, depths[1]]], float)
+        image = spheres.render(centre, np.ones(2), np.array([red, blue]), view, depth=10)
+        middle = image[40, 44]
+        assert middle[3] == 1 and np.argmax(middle[:3]) == top
+        assert image[40, 24, 0] > image[40, 24, 2] and image[40, 64, 2] > image[40, 64, 0]
+        assert image[0, 0, 3] == 0
+
+
+def test_labels_move_apart_in_their_order_and_no_farther_than_needed():
+    assert style.spread([3, 1, 2], 0.5).tolist() == [3, 1, 2]
+    moved = style.spread([0.5, 0.5, 0.45, 3], 1)
+    assert np.diff(np.sort(moved)).min() >= 1 - 1e-12
+    assert np.argsort(moved).tolist() == [2, 0, 1, 3]
+    assert moved[:3].mean() == pytest.approx(np.mean([0.5, 0.5, 0.45]))
+
+
+def test_designs_in_words():
+    design = {"height_mm": 33.0, "friction": 0.5, "theta_deg": 56.71}
+    assert style.design_text(design) == r"$\theta$ = 56.7°, $H$ = 33 mm, friction = 0.5"
+
+
+def test_files_are_the_same_every_time(tmp_path):
+    for folder in ("first", "second"):
+        paths = [tmp_path / folder / f"errors.{suffix}" for suffix in ("png", "pdf")]
+        table_of_errors().to_csv(tmp_path / "errors.csv", index=False)
+        errors.write({"dpi": 100}, tmp_path / "errors.csv", paths)
+    for suffix in ("png", "pdf"):
+        first, second = (
+            (tmp_path / folder / f"errors.{suffix}").read_bytes() for folder in ("first", "second")
+        )
+        assert first == second
+        assert not [
+            word for word in (b"CreationDate", b"Producer", b"atplotlib v", b"Software") if word in first
+        ]
+    assert len(list((tmp_path / "first").iterdir())) == 2
+
+
+@pytest.mark.parametrize("name", cli.FIGURES)
+def test_every_figure_takes_the_inputs_of_its_command(name):
+    module = {"hopper": hopper, "curves": curves, "fit": fit, "verification": verification, "front": front}
+    parameters = inspect.signature(module.get(name, errors).write).parameters
+    assert list(parameters) == ["params", *(option.rstrip("*") for option in cli.FIGURES[name]), "outputs"]
