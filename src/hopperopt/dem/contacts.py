@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from hopperopt.dem.laws import directional_torque, hertz_mindlin
-from hopperopt.dem.state import COUNT, OVERLAP, ROLLING_CDT, ROLLING_EDEM
+from hopperopt.dem.state import COUNT, OVERLAP, ROLLING_CDT, ROLLING_EDEM, STEP
 from hopperopt.dem.walls import nearest
 
 LANES = 64
@@ -23,7 +23,6 @@ VX, VY, VZ = 4, 5, 6  # velocity of i's surface relative to the other's (m/s)
 XI_X, XI_Y, XI_Z = 7, 8, 9  # tangential spring (m), old and then new
 RADIUS, MASS, SMALLER = 10, 11, 12  # effective radius and mass, the smaller radius
 ARM_I, ARM_J = 13, 14  # lever arms l_i, l_j (m)
-WX, WY, WZ = 15, 16, 17  # relative spin, for `cdt` (rad/s)
 # Filled by the law:
 FX, FY, FZ = 18, 19, 20  # force on i (N)
 TX, TY, TZ = 21, 22, 23  # n x -F_t; times the lever arm: torque on either body (N)
@@ -71,14 +70,16 @@ def apply_law(block, lanes, law, dt):
 
 
 @njit(error_model="numpy")
-def roll_cdt(block, lanes, law):
-    """Rolling torques of the `cdt` model; ARM_I must not matter: the arm is R* for pairs and l_i for
-    walls."""
+def roll_cdt(block, lanes, law, arm):
+    """Rolling torques of the `cdt` model; `arm`: row of the lever arm, R* of pairs, l_i at walls."""
     for q in range(lanes):
         n = (block[NX * STRIDE + q], block[NY * STRIDE + q], block[NZ * STRIDE + q])
-        w = (block[WX * STRIDE + q], block[WY * STRIDE + q], block[WZ * STRIDE + q])
-        arm = block[RADIUS * STRIDE + q] if block[ARM_J * STRIDE + q] > 0.0 else block[ARM_I * STRIDE + q]
-        t = directional_torque(n, w, law.rolling * block[LOAD * STRIDE + q] * arm)
+        w = (
+            block[IX * STRIDE + q] - block[JX * STRIDE + q],
+            block[IY * STRIDE + q] - block[JY * STRIDE + q],
+            block[IZ * STRIDE + q] - block[JZ * STRIDE + q],
+        )
+        t = directional_torque(n, w, law.rolling * block[LOAD * STRIDE + q] * block[arm * STRIDE + q])
         block[RX * STRIDE + q] = t[0]
         block[RY * STRIDE + q] = t[1]
         block[RZ * STRIDE + q] = t[2]
@@ -93,13 +94,9 @@ def note_overlaps(block, monitors):
 
 @njit
 def find_contacts(spheres, pairs, count):
-    """List the pairs in touch in `pairs.contact` and `pairs.owner`. Returns their number.
-
-    The spring of a pair that has separated is forgotten.
-    """
+    """List the pairs in touch in `pairs.contact`. Returns their number."""
     position, radius = spheres.position, spheres.radius
-    start, partner, touching = pairs.start, pairs.partner, pairs.touching
-    spring, contact, owner = pairs.spring, pairs.contact, pairs.owner
+    start, partner, contact = pairs.start, pairs.partner, pairs.contact
     found = 0
     for i in range(count):
         x, y, z, own = position[i, 0], position[i, 1], position[i, 2], radius[i]
@@ -107,32 +104,33 @@ def find_contacts(spheres, pairs, count):
             j = partner[k]
             dx, dy, dz = x - position[j, 0], y - position[j, 1], z - position[j, 2]
             reach = own + radius[j]
-            touch = dx * dx + dy * dy + dz * dz < reach * reach
-            if touching[k] > touch:
-                spring[k, 0] = spring[k, 1] = spring[k, 2] = 0.0
-            touching[k] = touch
             # Written first, kept by moving on: no branch to mispredict.
             contact[found] = k
-            owner[found] = i
-            found += touch
+            found += dx * dx + dy * dy + dz * dz < reach * reach
     return found
 
 
 @njit
-def gather_pairs(spheres, pairs, block, begin, lanes):
-    """Copy the states of the contacts `begin ... begin + lanes` into the block."""
+def gather_pairs(spheres, pairs, block, begin, lanes, step):
+    """Copy the states of the contacts `begin ... begin + lanes` into the block.
+
+    A pair that was apart in the step before starts with a slack spring.
+    """
     position, velocity, spin = spheres.position, spheres.velocity, spheres.spin
     radius, mass = spheres.radius, spheres.mass
-    contact, owner, partner, spring = pairs.contact, pairs.owner, pairs.partner, pairs.spring
+    contact, owner, partner = pairs.contact, pairs.owner, pairs.partner
+    touched, spring = pairs.touched, pairs.spring
     for q in range(lanes):
         k = contact[begin + q]
-        i, j = owner[begin + q], partner[k]
+        i, j = owner[k], partner[k]
+        held = 1.0 if touched[k] == step - 1 else 0.0
+        touched[k] = step
         for a in range(3):
             block[(NX + a) * STRIDE + q] = position[i, a] - position[j, a]
             block[(UX + a) * STRIDE + q] = velocity[i, a] - velocity[j, a]
             block[(IX + a) * STRIDE + q] = spin[i, a]
             block[(JX + a) * STRIDE + q] = spin[j, a]
-            block[(XI_X + a) * STRIDE + q] = spring[k, a]
+            block[(XI_X + a) * STRIDE + q] = held * spring[k, a]
         block[RADIUS_I * STRIDE + q] = radius[i]
         block[RADIUS_J * STRIDE + q] = radius[j]
         block[MASS_I * STRIDE + q] = mass[i]
@@ -170,9 +168,6 @@ def meet_pairs(block, lanes):
         block[SMALLER * STRIDE + q] = min(r_i, r_j)
         block[ARM_I * STRIDE + q] = l_i
         block[ARM_J * STRIDE + q] = l_j
-        block[WX * STRIDE + q] = block[IX * STRIDE + q] - block[JX * STRIDE + q]
-        block[WY * STRIDE + q] = block[IY * STRIDE + q] - block[JY * STRIDE + q]
-        block[WZ * STRIDE + q] = block[IZ * STRIDE + q] - block[JZ * STRIDE + q]
 
 
 @njit
@@ -182,7 +177,7 @@ def scatter_pairs(spheres, pairs, block, begin, lanes, rolling, friction):
     contact, owner, partner, spring = pairs.contact, pairs.owner, pairs.partner, pairs.spring
     for q in range(lanes):
         k = contact[begin + q]
-        i, j = owner[begin + q], partner[k]
+        i, j = owner[k], partner[k]
         l_i, l_j = block[ARM_I * STRIDE + q], block[ARM_J * STRIDE + q]
         for a in range(3):
             f, t = block[(FX + a) * STRIDE + q], block[(TX + a) * STRIDE + q]
@@ -208,25 +203,24 @@ def pair_forces(spheres, pairs, counters, block, settings):
     law = settings.pair_law
     for begin in range(0, contacts, LANES):
         lanes = min(LANES, contacts - begin)
-        gather_pairs(spheres, pairs, block, begin, lanes)
+        gather_pairs(spheres, pairs, block, begin, lanes, counters[STEP])
         meet_pairs(block, lanes)
         apply_law(block, lanes, law, settings.time_step)
         if settings.rolling == ROLLING_CDT:
-            roll_cdt(block, lanes, law)
+            roll_cdt(block, lanes, law, RADIUS)
         scatter_pairs(spheres, pairs, block, begin, lanes, settings.rolling, law.rolling)
     return contacts
 
 
 @njit(error_model="numpy")
-def deepest(spheres, touches, walls, i, k):
-    """The element of wall list entry k that sphere i overlaps most.
+def deepest(walls, first, last, r, z, radius):
+    """Which of the elements first ... last of a surface a sphere overlaps most.
 
-    Returns (element or -1, overlap in m, normal: meridian (r, z) components towards the sphere).
+    Arguments: centre in its meridian plane and radius of the sphere, m. Returns (element or -1, overlap in m,
+    normal towards the sphere: components r, z).
     """
-    r = math.sqrt(spheres.position[i, 0] ** 2 + spheres.position[i, 1] ** 2)
-    z, radius = spheres.position[i, 2], spheres.radius[i]
     found, shortest, n_r, n_z = -1, radius * radius, 0.0, 0.0
-    for e in range(touches.first[k], touches.last[k] + 1):
+    for e in range(first, last + 1):
         if walls.closed[e]:
             dr, dz, closest = nearest(walls, e, r, z)
             squared = dr * dr + dz * dz
@@ -250,12 +244,12 @@ def gather_touch(spheres, touches, block, q, i, k, delta, n_r, n_z):
         b, c = (a + 1) % 3, (a + 2) % 3
         block[(NX + a) * STRIDE + q] = n[a]
         block[(VX + a) * STRIDE + q] = v[a] - arm * (w[b] * n[c] - w[c] * n[b])
-        block[(WX + a) * STRIDE + q] = w[a]
+        block[(IX + a) * STRIDE + q] = w[a]
+        block[(JX + a) * STRIDE + q] = 0.0
         block[(XI_X + a) * STRIDE + q] = touches.spring[k, a]
     block[RADIUS * STRIDE + q] = block[SMALLER * STRIDE + q] = spheres.radius[i]
     block[MASS * STRIDE + q] = spheres.mass[i]
     block[ARM_I * STRIDE + q] = arm
-    block[ARM_J * STRIDE + q] = 0.0
 
 
 @njit
@@ -284,7 +278,7 @@ def wall_block(spheres, touches, walls, block, rows, entries, lanes, settings):
     law = settings.wall_law
     apply_law(block, lanes, law, settings.time_step)
     if settings.rolling == ROLLING_CDT:
-        roll_cdt(block, lanes, law)
+        roll_cdt(block, lanes, law, ARM_I)
     scatter_touches(spheres, touches, walls, block, rows, entries, lanes, settings.rolling, law.rolling)
 
 
@@ -296,7 +290,10 @@ def wall_forces(spheres, touches, walls, counters, block, settings):
     contacts = lanes = 0
     for i in range(counters[COUNT]):
         for k in range(touches.start[i], touches.start[i + 1]):
-            element, delta, n_r, n_z = deepest(spheres, touches, walls, i, k)
+            r = math.sqrt(spheres.position[i, 0] ** 2 + spheres.position[i, 1] ** 2)
+            element, delta, n_r, n_z = deepest(
+                walls, touches.first[k], touches.last[k], r, spheres.position[i, 2], spheres.radius[i]
+            )
             if element < 0 and touches.element[k] >= 0:
                 touches.spring[k, 0] = touches.spring[k, 1] = touches.spring[k, 2] = 0.0
             touches.element[k] = element

@@ -5,7 +5,7 @@ import math
 from numba import njit
 
 from hopperopt.dem.laws import braked
-from hopperopt.dem.state import COUNT, PARKED, SPEED, STALE, STEP
+from hopperopt.dem.state import COUNT, OPENED, PARKED, SPEED, STALE, STEP
 
 
 @njit
@@ -35,13 +35,14 @@ def kick_and_drift(spheres, counters, monitors, settings):
     for i in range(counters[COUNT]):
         mass = spheres.mass[i]
         inertia = 0.4 * mass * radius[i] ** 2
+        per_mass, per_inertia = dt / mass, dt / inertia
         speed2 = moved2 = 0.0
         for a in range(3):
-            v = velocity[i, a] + (force[i, a] / mass + g[a]) * dt
+            v = velocity[i, a] + force[i, a] * per_mass + g[a] * dt
             x = position[i, a] + v * dt
             velocity[i, a] = v
             position[i, a] = x
-            spin[i, a] += torque[i, a] / inertia * dt
+            spin[i, a] += torque[i, a] * per_inertia
             speed2 += v * v
             moved2 += (x - reference[i, a]) ** 2
         if rolling_limit[i] > 0.0:
@@ -73,7 +74,7 @@ def take_out(spheres, exit_time, counters, settings):
         if not (PARKED / 2.0 < z < settings.sensor):
             continue
         late = (z - settings.sensor) / spheres.velocity[i, 2]  # time since the crossing
-        exit_time[spheres.identity[i]] = counters[STEP] * settings.time_step - late
+        exit_time[spheres.identity[i]] = (counters[STEP] - counters[OPENED]) * settings.time_step - late
         spheres.position[i, 2] = PARKED - spheres.identity[i]  # a metre apart: they must not meet there
         for a in range(3):
             spheres.velocity[i, a] = 0.0

@@ -32,11 +32,12 @@ def hertz_mindlin(delta, n, v, xi, radius, mass, law, dt):
     - Coulomb: |xi| <= (1 + c_t) mu N / S_t and the tangential force <= mu N.
     """
     a = math.sqrt(radius * delta)
+    t_over_n = 4.0 * law.shear_modulus / law.modulus  # S_t / S_n, the same for all contacts
     s_n = 2.0 * law.modulus * a
-    s_t = 8.0 * law.shear_modulus * a
+    s_t = t_over_n * s_n
     elastic = 2.0 / 3.0 * s_n * delta
     gamma_n = law.damping * math.sqrt(s_n * mass)
-    gamma_t = law.damping * math.sqrt(s_t * mass)
+    gamma_t = math.sqrt(t_over_n) * gamma_n
     per_mass = dt / mass
     c_n = 0.5 * gamma_n * per_mass
     c_t = 1.75 * gamma_t * per_mass

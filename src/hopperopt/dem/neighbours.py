@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from hopperopt.dem.state import COUNT, NEEDED, PAIR_CARRIED, PARKED, REMOVED
+from hopperopt.dem.state import COUNT, NEEDED, NEVER, PAIR_CARRIED, PARKED, REMOVED, STEP
 
 CELLS_PER_SPHERE = 8  # a coarser grid is used beyond, so that one sphere far away costs no memory
 
@@ -22,7 +22,7 @@ def carry_pairs(spheres, pairs, counters):
     found = 0
     for i in range(counters[COUNT]):
         for k in range(pairs.start[i], pairs.start[i + 1]):
-            if pairs.touching[k]:
+            if pairs.touched[k] == counters[STEP] - 1:
                 pairs.carried[found, 0] = spheres.identity[i]
                 pairs.carried[found, 1] = spheres.identity[pairs.partner[k]]
                 for a in range(3):
@@ -121,12 +121,13 @@ def sort_by_cell(spheres, count, corner, size, cells):
 
 @njit
 def list_pairs(spheres, pairs, count, first, corner, size, cells):
-    """Fill the half list. Returns the entries needed; beyond the capacity nothing is written.
+    """Fill the half list. Returns the entries needed; it is whole where these are fewer than the capacity.
 
     Rows ahead of i in the same and the next cell of its x row, then the four x rows ahead in y and z.
     """
     position, radius, skin = spheres.position, spheres.radius, spheres.skin
-    capacity = len(pairs.partner)
+    partner, owner = pairs.partner, pairs.owner
+    capacity = len(partner)
     nx, ny, nz = cells
     found = 0
     for i in range(count):
@@ -148,7 +149,9 @@ def list_pairs(spheres, pairs, count, first, corner, size, cells):
                 dx, dy, dz = x - position[j, 0], y - position[j, 1], z - position[j, 2]
                 reach = own + radius[j] + skin[j]
                 # Written first, kept by moving on: no branch to mispredict.
-                pairs.partner[min(found, capacity - 1)] = j
+                place = min(found, capacity - 1)
+                partner[place] = j
+                owner[place] = i
                 found += dx * dx + dy * dy + dz * dz < reach * reach
     pairs.start[count] = min(found, capacity)
     return found
@@ -162,9 +165,7 @@ def restore_pairs(spheres, pairs, counters):
     for i in range(count):
         row[spheres.identity[i]] = i
     for k in range(pairs.start[count]):
-        pairs.touching[k] = 0
-        for a in range(3):
-            pairs.spring[k, a] = 0.0
+        pairs.touched[k] = NEVER
     for c in range(counters[PAIR_CARRIED]):
         i, j = row[pairs.carried[c, 0]], row[pairs.carried[c, 1]]
         if i < 0 or j < 0:
@@ -174,7 +175,7 @@ def restore_pairs(spheres, pairs, counters):
             i, j, sign = j, i, -1.0
         for k in range(pairs.start[i], pairs.start[i + 1]):
             if pairs.partner[k] == j:
-                pairs.touching[k] = 1
+                pairs.touched[k] = counters[STEP] - 1
                 for a in range(3):
                     pairs.spring[k, a] = sign * pairs.carried_spring[c, a]
                 break
@@ -196,7 +197,7 @@ def rebuild_pairs(spheres, pairs, counters, settings):
     corner, size, cells = make_grid(spheres, count, reach)
     first = sort_by_cell(spheres, count, corner, size, cells)
     needed = list_pairs(spheres, pairs, count, first, corner, size, cells)
-    if needed > len(pairs.partner):
+    if needed >= len(pairs.partner):  # the last place is where entries not kept are written
         counters[NEEDED] = needed
         return False
     restore_pairs(spheres, pairs, counters)

@@ -50,7 +50,12 @@ def spring_energy(spheres, pairs, touches, walls, counters, settings):
                     delta, (xi[0], xi[1], xi[2]), r_i * r_j / (r_i + r_j), settings.pair_law
                 )
         for k in range(touches.start[i], touches.start[i + 1]):
-            element, delta, _, _ = deepest(spheres, touches, walls, i, k)
+            x = spheres.position[i, 0] - half * spheres.velocity[i, 0]
+            y = spheres.position[i, 1] - half * spheres.velocity[i, 1]
+            z = spheres.position[i, 2] - half * spheres.velocity[i, 2]
+            element, delta, _, _ = deepest(
+                walls, touches.first[k], touches.last[k], math.sqrt(x * x + y * y), z, spheres.radius[i]
+            )
             if element >= 0:
                 xi = touches.spring[k]
                 total += elastic_energy(delta, (xi[0], xi[1], xi[2]), spheres.radius[i], settings.wall_law)

@@ -7,7 +7,9 @@ import numpy as np
 from hopperopt.dem import observe
 from hopperopt.dem.state import (
     COUNT,
+    COUNTERS,
     NEEDED,
+    OPENED,
     OVERLAP,
     PAIR_CARRIED,
     REMOVED,
@@ -54,7 +56,7 @@ class Simulation:
         self.pairs = make_pairs(n, 8 * n + 64)
         self.touches = make_touches(n, n + 64)
         self.exit_time = np.full(n, np.nan)  # by identity, s
-        self.counters = np.zeros(8, np.int64)
+        self.counters = np.zeros(len(COUNTERS), np.int64)
         self.counters[COUNT] = n
         self.counters[STALE] = 1
         self.counters[[PAIR_CARRIED, TOUCH_CARRIED]] = NOTHING_CARRIED
@@ -84,7 +86,7 @@ class Simulation:
     @property
     def steps(self):
         """Steps done since the start, or since the clock was set back."""
-        return int(self.counters[STEP])
+        return int(self.counters[STEP] - self.counters[OPENED])
 
     @property
     def time(self):
@@ -132,7 +134,7 @@ class Simulation:
         """Take a wall away at once, put the sensor plane at height `sensor` (m) and start the clock anew."""
         open_wall(self.walls, self.touches, self.touches.start[self.rows], self.wall_names.index(wall))
         self.settings = self.settings._replace(sensor=float(sensor))
-        self.counters[STEP] = 0
+        self.counters[OPENED] = self.counters[STEP]
 
     def by_identity(self, values):
         """Rows of a spheres array put under the identities; NaN for what has left. (n,) or (n, 3)."""
@@ -143,14 +145,17 @@ class Simulation:
         out[~left] = np.nan
         return out
 
+    def touching(self):
+        """Entries of the pair list that were in contact in the last step, (m,) int."""
+        return np.flatnonzero(self.pairs.touched[: self.pairs.start[self.rows]] == self.counters[STEP] - 1)
+
     def contacts(self):
         """Number of contacts of each sphere in the last step, by identity, (n,) int."""
-        rows, spheres = self.rows, self.spheres
-        entries = np.flatnonzero(self.pairs.touching[: self.pairs.start[rows]])
-        owner = np.searchsorted(self.pairs.start[: rows + 1], entries, side="right") - 1
+        rows, spheres, pairs = self.rows, self.spheres, self.pairs
+        entries = self.touching()
         held = np.flatnonzero(self.touches.element[: self.touches.start[rows]] >= 0)
         at_wall = np.searchsorted(self.touches.start[: rows + 1], held, side="right") - 1
-        touching = np.concatenate([owner, self.pairs.partner[entries], at_wall])
+        touching = np.concatenate([pairs.owner[entries], pairs.partner[entries], at_wall])
         return np.bincount(spheres.identity[touching], minlength=len(self.exit_time))
 
     def wall_force(self, wall):

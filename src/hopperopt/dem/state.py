@@ -30,10 +30,10 @@ class Pairs(NamedTuple):
 
     start: np.ndarray  # (n + 1,) int64
     partner: np.ndarray  # (capacity,) int32
-    touching: np.ndarray  # (capacity,) uint8, whether the pair was in contact in the last step
-    spring: np.ndarray  # (capacity, 3) m, tangential spring of the lower row against its partner
-    contact: np.ndarray  # (capacity,) int32, scratch: list entries in contact
-    owner: np.ndarray  # (capacity,) int32, scratch: their lower rows
+    owner: np.ndarray  # (capacity,) int32, the row i of each entry
+    touched: np.ndarray  # (capacity,) int64, the step in which the pair was last in contact
+    spring: np.ndarray  # (capacity, 3) m, tangential spring of i against its partner, valid if it touched
+    contact: np.ndarray  # (capacity,) int32, scratch: the entries in contact in this step
     carried: np.ndarray  # (capacity, 2) int64, identities of the contacts that a rebuild carries over
     carried_spring: np.ndarray  # (capacity, 3) m
 
@@ -81,10 +81,11 @@ ROLLING_NONE, ROLLING_EDEM, ROLLING_CDT = 0, 1, 2
 ROLLING = {"none": ROLLING_NONE, "edem": ROLLING_EDEM, "cdt": ROLLING_CDT}
 
 # Integer counters of a run, in one array that the compiled code updates.
-COUNT, STEP, STALE, REBUILDS, PAIR_CARRIED, TOUCH_CARRIED, REMOVED, NEEDED = range(8)
+COUNT, STEP, OPENED, STALE, REBUILDS, PAIR_CARRIED, TOUCH_CARRIED, REMOVED, NEEDED = COUNTERS = range(9)
 # Float monitors: largest overlap over the smaller radius, largest squared ratio of a speed to the fall speed.
 OVERLAP, SPEED = range(2)
 
+NEVER = -2  # step of a contact that has not been; -1 is the step before the first
 PARKED = -1.0e6  # m: where a sphere that left waits for the next rebuild to drop it
 
 
@@ -114,12 +115,12 @@ def make_spheres(position, velocity, radius, density, spin=None):
 def make_pairs(count, capacity):
     """Empty neighbour list for `count` spheres and at most `capacity` entries."""
     return Pairs(
-        start=np.zeros(count + 1, np.int64),
-        partner=np.zeros(capacity, np.int32),
-        touching=np.zeros(capacity, np.uint8),
+        start=np.zeros(count + 1, np.uint32),
+        partner=np.zeros(capacity, np.uint32),
+        owner=np.zeros(capacity, np.uint32),
+        touched=np.full(capacity, NEVER, np.int64),
         spring=np.zeros((capacity, 3)),
-        contact=np.zeros(capacity, np.int32),
-        owner=np.zeros(capacity, np.int32),
+        contact=np.zeros(capacity, np.uint32),
         carried=np.zeros((capacity, 2), np.int64),
         carried_spring=np.zeros((capacity, 3)),
     )

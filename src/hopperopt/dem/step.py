@@ -26,6 +26,9 @@ def rebuild(spheres, pairs, touches, walls, counters, settings):
         carry_pairs(spheres, pairs, counters)
         carry_touches(spheres, touches, counters)
         drop_parked(spheres, counters)
+    if counters[COUNT] == 0:
+        counters[STALE] = 0
+        return DONE
     if not rebuild_pairs(spheres, pairs, counters, settings):
         return PAIRS_FULL
     if not rebuild_touches(spheres, touches, walls, counters):
