@@ -21,6 +21,8 @@ surrogate:
   validation_experiments: 1
   test_experiments: 1
 optimise: {population: 8, generations: 3}
+verification:
+  cases: {selected: selected, plan_centre: plan_centre, bare: bare}
 figures: {dpi: 50}
 """
 # Both extremes of every factor twice: whatever two experiments are held out, or one level is changed.
@@ -63,24 +65,21 @@ class Study:
         return {f"{rule} {found[1]}" if rule in SIMULATIONS else rule for rule, found in outputs} - {"all"}
 
     def edit(self, name, old, new):
-        """Replace text in a file of the study."""
-        replace(self.directory / name, old, new)
-
-
-def replace(path, old, new):
-    """Replace text that stands once in a file."""
-    text = path.read_text()
-    assert text.count(old) == 1, f"{old!r} is {text.count(old)} times in {path}"
-    path.write_text(text.replace(old, new))
+        """Replace text that stands once in a file of the study."""
+        path = self.directory / name
+        text = path.read_text()
+        assert text.count(old) == 1, f"{old!r} is {text.count(old)} times in {path}"
+        path.write_text(text.replace(old, new))
 
 
 @pytest.fixture(scope="session")
 def new_study():
-    """Function that makes a study of a directory and the text of its configuration."""
+    """Function that makes a study of a directory and the text of its configuration, or of edited code."""
 
-    def make(directory, config):
+    def make(directory, config, additions=None):
         (directory / "config.yaml").write_text(config)
-        return Study(directory)
+        package = CLONE / "src" if additions is None else copied_package(directory / "src", additions)
+        return Study(directory, package)
 
     return make
 
@@ -105,11 +104,18 @@ def study(finished, tmp_path):
 
 @pytest.fixture
 def edited(study, tmp_path):
-    """Function that returns the copied study with a copy of the package in which one text is replaced."""
+    """Function that returns the copied study with a copy of the package; text is added to its modules."""
 
-    def edit(module, old, new):
-        shutil.copytree(CLONE / "src", tmp_path / "src")
-        replace(tmp_path / "src" / "hopperopt" / module, old, new)
-        return Study(study.directory, tmp_path / "src")
+    def edit(additions):
+        return Study(study.directory, copied_package(tmp_path / "src", additions))
 
     return edit
+
+
+def copied_package(folder, additions):
+    """Copy the package and add text to the ends of modules; return the copy's folder."""
+    shutil.copytree(CLONE / "src" / "hopperopt", folder / "hopperopt")
+    for module, text in additions.items():
+        with (folder / "hopperopt" / module).open("a") as file:
+            file.write(text)
+    return folder
