@@ -49,10 +49,11 @@ def test_shipped_file_names_every_key():
 def test_reduced_study_has_all_experiments_and_cases():
     whole = config.parse(config.load([ROOT / "config.yaml"]))
     reduced = config.parse(config.load([ROOT / "config.yaml", ROOT / "config/ci.yaml"]))
-    assert reduced.experiments() == whole.experiments()
-    assert reduced.cases() == whole.cases()
+    assert [name for name, _ in reduced.experiments()] == [name for name, _ in whole.experiments()]
+    assert reduced.cases().keys() == whole.cases().keys()
     assert reduced.results_dir == "results/ci"
-    assert sum(reduced.simulation_case(CENTRE, "a", 1)["particles"]["counts"]) == 900
+    cases = [reduced.simulation_case(design, name, 1) for name, design in reduced.experiments()]
+    assert all(2000 < sum(case["particles"]["counts"]) < 4000 for case in cases)
 
 
 @pytest.mark.parametrize(
