@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.text import Text
 
 from hopperopt import cli, dataset, outflow
-from hopperopt.figures import curves, errors, fit, front, hopper, spheres, style, verification
+from hopperopt.figures import curves, errors, fit, front, hopper, labels, spheres, style, verification
 from hopperopt.surrogate import targets
 
 BATCH = np.array([8, 27, 64]) / 99
@@ -35,9 +35,9 @@ CASE = {
 def make_plan(make_run):
     """Function that returns a plan's data set, without segregation, of so many experiments."""
 
-    def plan(experiments=25, replicates=1, factors=3, count=400, dropped=()):
+    def plan(experiments=25, replicates=1, factors=3, count=400, dropped=(), name="exp_{:02d}"):
         rng = np.random.default_rng(3)
-        names = [f"exp_{n:02d}" for n in range(1, experiments + 1)]
+        names = [name.format(n) for n in range(1, experiments + 1)]
         columns = dict(
             itertools.islice((FACTORS | dict.fromkeys(("friction", "b", "c"), (0, 1))).items(), factors)
         )
@@ -155,6 +155,7 @@ def check_texts(figure):
         {"experiments": 1, "count": 100},
         {"experiments": 7, "replicates": 2, "factors": 6},
         {"experiments": 12, "dropped": [("exp_04", 1)]},
+        {"experiments": 5, "name": "long_name_{}"},
     ],
 )
 def test_curves_can_be_read_for_any_number_of_experiments(make_plan, plan):
@@ -298,8 +299,8 @@ def test_the_nearest_sphere_is_seen():
 
 
 def test_labels_move_apart_in_their_order_and_no_farther_than_needed():
-    assert style.spread([3, 1, 2], 0.5).tolist() == [3, 1, 2]
-    moved = style.spread([0.5, 0.5, 0.45, 3], 1)
+    assert labels.spread([3, 1, 2], 0.5).tolist() == [3, 1, 2]
+    moved = labels.spread([0.5, 0.5, 0.45, 3], 1)
     assert np.diff(np.sort(moved)).min() >= 1 - 1e-12
     assert np.argsort(moved).tolist() == [2, 0, 1, 3]
     assert moved[:3].mean() == pytest.approx(np.mean([0.5, 0.5, 0.45]))

@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from hopperopt import files
-from hopperopt.figures import multiples, style
+from hopperopt.figures import labels, multiples, style
 
 
 def write(params: Mapping, dataset: str | os.PathLike, outputs: Sequence[str | os.PathLike]) -> None:
@@ -43,7 +43,7 @@ def draw(dataset: xr.Dataset) -> Figure:
             panel.text(0.5, 0.5, "no complete run", ha="center", va="center", color=style.FAINT)
     columns = panels[0].get_subplotspec().get_gridspec().ncols
     for panel in panels[columns - 1 :: columns]:
-        style.label_ends(
+        labels.at_ends(
             panel, {style.SYMBOLS[k]: (float(target.sel(size_class=k)), c) for k, c in style.COLOURS.items()}
         )
     return figure

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from hopperopt import files
-from hopperopt.figures import style
+from hopperopt.figures import labels, style
 from hopperopt.surrogate import features
 
 USES = {
@@ -35,15 +35,15 @@ def draw(errors: pd.DataFrame) -> Figure:
     figure = style.page(style.COLUMN, 92)
     axes = style.panels(figure, 2, 1, style.Frame(13, 24, 8.5, 5), (0, 6), sharex=True)[:, 0]
     for panel, name in zip(axes, features.OUTPUTS, strict=True):
-        labels = {}
+        ends = {}
         for use, look in USES.items():
             values = errors[f"{use}_rmse_{name}"]
             if values.notna().any():
                 panel.plot(errors["hidden"], values, **look, clip_on=False)
-                labels[use.replace("_", "-")] = (values.iloc[-1], look["color"])
+                ends[use.replace("_", "-")] = (values.iloc[-1], look["color"])
         panel.set_ylim(0)
         panel.set_title(f"rms error of {style.SYMBOLS[name]}", loc="left")
-        style.label_ends(panel, labels)
+        labels.at_ends(panel, ends)
         for hidden in errors.loc[errors["selected"].astype(bool), "hidden"]:
             panel.axvline(hidden, color=style.FAINT, linewidth=0.7, linestyle="--", zorder=0)
             panel.annotate("selected", (hidden, 0), (2, 2), textcoords="offset points", color="#777777")

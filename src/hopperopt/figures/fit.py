@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hopperopt import files
-from hopperopt.figures import multiples, style
+from hopperopt.figures import labels, multiples, style
 from hopperopt.surrogate import prediction
 
 HEADROOM = 1.2  # for the words at the top of a panel
@@ -53,7 +53,7 @@ def draw(training: xr.Dataset, predicted: np.ndarray) -> Figure:
     columns = panels[0].get_subplotspec().get_gridspec().ncols
     batch = training["target_fraction"].to_series()
     for panel in panels[columns - 1 :: columns]:
-        style.label_ends(panel, {style.SYMBOLS[k]: (m, style.COLOURS[k]) for k, m in batch.items()})
+        labels.at_ends(panel, {style.SYMBOLS[k]: (m, style.COLOURS[k]) for k, m in batch.items()})
     return figure
 
 

@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from hopperopt import files, outflow
-from hopperopt.figures import style
+from hopperopt.figures import labels, style
 from hopperopt.surrogate import features
 
 SIGMAS = 1.64  # intervals of 90 %
@@ -81,7 +81,7 @@ def _label_selected(panel, front):
     for _, row in front[front["selected"].astype(bool)].iterrows():
         design = {name: row[name] for name in front.columns if name not in (*COLUMNS, "feasible", "selected")}
         text = style.design_text(design).replace(", ", "\n")
-        style.label_points(panel, {text: tuple(row[COLUMNS])}, _along(front[COLUMNS].to_numpy(float)))
+        labels.at_points(panel, {text: tuple(row[COLUMNS])}, _along(front[COLUMNS].to_numpy(float)))
 
 
 def _draw_simulated(panel, front, plan, summary):
@@ -89,16 +89,17 @@ def _draw_simulated(panel, front, plan, summary):
     for line in (panel.axhline, panel.axvline):
         line(0, color=style.FAINT, linewidth=0.5, zorder=0)
     panel.plot(*plan, linestyle="", zorder=1, **PLAN)
-    labels, lines = {}, [plan.T, _along(front[COLUMNS].to_numpy(float))]
+    # A mark that is covered is worse than a line that is touched.
+    places, lines = {}, [np.repeat(plan.T, 4, axis=0), _along(front[COLUMNS].to_numpy(float))]
     panel.autoscale_view()
     lines += [_along([(x, 0) for x in panel.get_xlim()]), _along([(0, y) for y in panel.get_ylim()])]
     for case in dict.fromkeys(summary["case"]):
         rows = summary[summary["case"] == case].set_index("objective").loc[list(features.OUTPUTS)]
         simulated = rows["simulated_J_corrected"].to_numpy()
         if np.isfinite(simulated).all():
-            labels[case.replace("_", " ")] = tuple(simulated)
+            places[case.replace("_", " ")] = tuple(simulated)
             lines += _draw_case(panel, rows)
-    style.label_points(panel, labels, np.vstack(lines))
+    labels.at_points(panel, places, np.vstack(lines))
 
 
 def _draw_case(panel, rows):

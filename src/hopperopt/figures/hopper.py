@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
-from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from hopperopt import files, outflow
@@ -155,10 +154,9 @@ def _draw_dimensions(axes: Axes, walls: Mapping, limits: Sequence[float]) -> Non
 
 def _dimension(axes, start, end, text, offset, align):
     """Draw a line with arrow heads at both ends, and its length beside the middle."""
-    halo = [withStroke(linewidth=1.8, foreground="white")]
     arrow = {"arrowstyle": "<|-|>,head_length=0.3,head_width=0.12", "color": style.INK, "linewidth": 0.6}
     line = axes.annotate("", end, start, zorder=6, arrowprops={**arrow, "shrinkA": 0, "shrinkB": 0})
-    line.arrow_patch.set_path_effects(halo)
+    line.arrow_patch.set_path_effects(style.HALO)
     axes.annotate(
         text,
         ((start[0] + end[0]) / 2, (start[1] + end[1]) / 2),
@@ -167,7 +165,7 @@ def _dimension(axes, start, end, text, offset, align):
         ha="left" if offset[0] else "center",
         va=align,
         zorder=6,
-        path_effects=halo,
+        path_effects=style.HALO,
     )
 
 

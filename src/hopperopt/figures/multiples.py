@@ -15,7 +15,7 @@ PANEL = (29.0, 23.0)  # mm
 FRAME = style.Frame(left=11, right=7, bottom=8.5, top=9)
 GAPS = (3.0, 6.0)
 KEY = 4.0  # mm, height of the key's row
-MOST_FACTORS = 3  # whose values fit above a panel
+MOST_FACTORS, LONGEST_NAME = 3, 4  # what fits above a panel
 
 
 def grid(data: xr.Dataset, key: Mapping[str, Mapping] | None = None) -> tuple[Figure, list[Axes]]:
@@ -48,11 +48,11 @@ def grid(data: xr.Dataset, key: Mapping[str, Mapping] | None = None) -> tuple[Fi
 def _label(figure, panels, data, frame):
     """Write the panels' headings, what stands in them, and the names of the axes."""
     factors = [name for name, c in data.coords.items() if c.dims == ("experiment",) and name != "experiment"]
-    if len(factors) > MOST_FACTORS:
+    names = [re.sub(r"^exp_0*(?=\d)", "", str(name)) for name in data["experiment"].values]
+    if len(factors) > MOST_FACTORS or max(map(len, names)) > LONGEST_NAME:
         factors = []
-    for row, panel in enumerate(panels):
-        name = str(data["experiment"].values[row])
-        panel.set_title(re.sub(r"^exp_0*(?=\d)", "", name), loc="left", fontweight="bold")
+    for row, (name, panel) in enumerate(zip(names, panels, strict=True)):
+        panel.set_title(name, loc="left", fontweight="bold")
         panel.set_title("  ".join(f"{float(data[factor][row]):.3g}" for factor in factors), loc="right")
     width, height = style.size(figure)
     above = height - 1 - (frame.top - FRAME.top)

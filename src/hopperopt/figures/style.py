@@ -1,17 +1,15 @@
 """What all figures share: sizes in print, colours, words, and files that are the same every time."""
 
-import itertools
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
-import matplotlib
-import numpy as np
-from matplotlib.axes import Axes
+import matplotlib.style
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 
 from hopperopt import files
@@ -27,48 +25,45 @@ OBJECTIVES = {"fine": r"$J_\mathrm{f}$", "intermediate": r"$J_\mathrm{i}$"}
 INK, FAINT = "#333333", "#B0B0B0"
 DISCHARGED = "discharged mass fraction $M$"
 
-# Where a label may stand beside its point: distances in points, directions, the likelier ones first.
-DISTANCES = (5.0, 10.0, 16.0, 24.0)
-DIRECTIONS = ((1, 0), (-1, 0), (0, 1), (0, -1), (0.7, 0.7), (0.7, -0.7), (-0.7, 0.7), (-0.7, -0.7))
-ALIGN, ALIGN_UP = {1: "left", 0: "center", -1: "right"}, {1: "bottom", 0: "center", -1: "top"}
+HALO = [withStroke(linewidth=1.8, foreground="white")]  # keeps words legible upon lines and particles
 
 FACTORS = {"theta": r"$\theta$", "length": "$L$", "height": "$H$"}
 UNITS = {"deg": "°", "mm": " mm"}
 
-styled: Callable = matplotlib.rc_context(
-    {
-        "font.family": "DejaVu Sans",  # comes with matplotlib: the same on every machine
-        "font.size": 7,
-        "axes.labelsize": 7,
-        "axes.titlesize": 7,
-        "xtick.labelsize": 7,
-        "ytick.labelsize": 7,
-        "axes.linewidth": 0.5,
-        "axes.edgecolor": INK,
-        "axes.labelcolor": INK,
-        "text.color": INK,
-        "xtick.color": INK,
-        "ytick.color": INK,
-        "axes.titlepad": 3,
-        "axes.labelpad": 2.5,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "axes.unicode_minus": True,
-        "xtick.major.width": 0.5,
-        "ytick.major.width": 0.5,
-        "xtick.major.size": 2,
-        "ytick.major.size": 2,
-        "xtick.major.pad": 2,
-        "ytick.major.pad": 2,
-        "lines.linewidth": 1.0,
-        "lines.markersize": 3,
-        "lines.markeredgewidth": 0.7,
-        "patch.linewidth": 0.5,
-        "hatch.linewidth": 0.4,
-        "mathtext.fontset": "dejavusans",
-        "pdf.fonttype": 42,
-        "savefig.facecolor": "white",
-    }
+styled: Callable = matplotlib.style.context(
+    [
+        "default",  # nothing is left to a user's own settings of matplotlib
+        {
+            "font.family": "DejaVu Sans",  # comes with matplotlib: the same on every machine
+            "font.size": 7,
+            "axes.labelsize": 7,
+            "axes.titlesize": 7,
+            "xtick.labelsize": 7,
+            "ytick.labelsize": 7,
+            "axes.linewidth": 0.5,
+            "axes.edgecolor": INK,
+            "axes.labelcolor": INK,
+            "text.color": INK,
+            "xtick.color": INK,
+            "ytick.color": INK,
+            "axes.titlepad": 3,
+            "axes.labelpad": 2.5,
+            "axes.spines.top": False,
+            "axes.spines.right": False,
+            "xtick.major.width": 0.5,
+            "ytick.major.width": 0.5,
+            "xtick.major.size": 2,
+            "ytick.major.size": 2,
+            "xtick.major.pad": 2,
+            "ytick.major.pad": 2,
+            "lines.linewidth": 1.0,
+            "lines.markersize": 3,
+            "lines.markeredgewidth": 0.7,
+            "mathtext.fontset": "dejavusans",
+            "pdf.fonttype": 42,
+            "savefig.facecolor": "white",
+        },
+    ]
 )  # decorates the functions that draw or save
 
 
@@ -169,72 +164,3 @@ def design_text(design: Mapping[str, float]) -> str:
     )
     parts = [(*factor_parts(name), design[name]) for name in names]
     return ", ".join(f"{symbol} = {value:.3g}{unit}" for symbol, unit, value in parts) or "no insert"
-
-
-def spread(positions: Sequence[float], distance: float) -> np.ndarray:
-    """Move positions as little as needed to be `distance` apart, in their order."""
-    positions = np.asarray(positions, dtype=float)
-    order = np.argsort(positions, kind="stable")
-    offsets = distance * np.arange(len(positions))
-    # With the offsets taken off, "apart" reads "not falling": least squares by pooling neighbours.
-    blocks = []
-    for value in positions[order] - offsets:
-        blocks.append([value, 1])
-        while len(blocks) > 1 and blocks[-2][0] > blocks[-1][0]:
-            (low, few), (high, many) = blocks[-2:]
-            blocks[-2:] = [[(low * few + high * many) / (few + many), few + many]]
-    moved = np.empty_like(positions)
-    moved[order] = np.concatenate([np.full(count, value) for value, count in blocks] or [[]]) + offsets
-    return moved
-
-
-def label_points(axes: Axes, labels: Mapping[str, tuple[float, float]], others: np.ndarray) -> list[Text]:
-    """Write labels {text: (x, y)} beside their points, where they cover least.
-
-    others (n, 2): further points of the axes to keep clear of.
-    """
-    axes.autoscale_view()  # transData would lag behind the data
-    points = axes.transData.transform(np.vstack([np.reshape(others, (-1, 2)), *labels.values()]))
-    frame, taken, texts = axes.get_window_extent(), [], []
-    for text, place in labels.items():
-        label = axes.annotate(text, place, (0, 0), textcoords="offset points", zorder=5)
-        costs = []
-        for distance, (x, y) in itertools.product(DISTANCES, DIRECTIONS):
-            label.set_position((distance * x, distance * y))
-            label.set(ha=ALIGN[np.sign(x)], va=ALIGN_UP[np.sign(y)])
-            box = label.get_window_extent()
-            covered = box.padded(2).count_contains(points) + 3 * sum(
-                bool(box.overlaps(other)) for other in taken
-            )
-            outside = 100 * (not (frame.contains(*box.min) and frame.contains(*box.max)))
-            costs.append((covered + outside + 0.05 * distance, distance, x, y))
-        _, distance, x, y = min(costs, key=lambda cost: cost[0])
-        label.set_position((distance * x, distance * y))
-        label.set(ha=ALIGN[np.sign(x)], va=ALIGN_UP[np.sign(y)])
-        taken.append(label.get_window_extent())
-        texts.append(label)
-    return texts
-
-
-def label_ends(axes: Axes, labels: Mapping[str, tuple[float, str]]) -> list[Text]:
-    """Write labels {text: (y, colour)} at the right of the axes, at the height of their lines.
-
-    Call when the limits of y are final.
-    """
-    height = axes.get_window_extent().height / axes.figure.dpi * 72
-    low, high = axes.get_ylim()
-    share = [(y - low) / (high - low) for y, _ in labels.values()]
-    at = spread(share, 8.5 / height)
-    return [
-        axes.annotate(
-            text,
-            (1, y),
-            xycoords="axes fraction",
-            xytext=(3, 0),
-            textcoords="offset points",
-            va="center",
-            color=colour,
-            annotation_clip=False,
-        )
-        for (text, (_, colour)), y in zip(labels.items(), at, strict=True)
-    ]

@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from hopperopt import files, outflow
-from hopperopt.figures import style
+from hopperopt.figures import labels, style
 from hopperopt.surrogate import features, prediction
 
 NETWORK = {"marker": "o", "markersize": 2.6, "linewidth": 0.8, "clip_on": False}
@@ -61,7 +61,7 @@ def draw(
     axes.set(xlim=(-0.02, 1.02), xlabel=style.DISCHARGED, ylabel="mass fraction in the outflow")
     axes.set_ylim(min(0.0, *(np.min(line.get_ydata()) for line in axes.lines)))
     ends = {style.SYMBOLS[k]: (m, style.COLOURS[k]) for k, m in zip(features.OUTPUTS, batch, strict=True)}
-    style.label_ends(axes, ends)
+    labels.at_ends(axes, ends)
     style.put(figure, 2, 71, style.design_text(design), va="top")
     style.key(figure, _meanings(len(runs), predicted is not None), (2, 67))
     return figure

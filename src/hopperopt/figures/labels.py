@@ -1,0 +1,95 @@
+"""Words beside the lines and points that they name, none of them upon another."""
+
+import itertools
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.text import Text
+
+from hopperopt.figures import style
+
+# Where a label may stand beside its point: distances in points, directions, the likelier ones first.
+DISTANCES = (5.0, 10.0, 16.0, 24.0)
+DIRECTIONS = ((1, 0), (-1, 0), (0, 1), (0, -1), (0.7, 0.7), (0.7, -0.7), (-0.7, 0.7), (-0.7, -0.7))
+ALIGN, ALIGN_UP = {1: "left", 0: "center", -1: "right"}, {1: "bottom", 0: "center", -1: "top"}
+
+
+def spread(positions: Sequence[float], distance: float) -> np.ndarray:
+    """Move positions as little as needed to be `distance` apart, in their order."""
+    positions = np.asarray(positions, dtype=float)
+    order = np.argsort(positions, kind="stable")
+    offsets = distance * np.arange(len(positions))
+    # With the offsets taken off, "apart" reads "not falling": least squares by pooling neighbours.
+    blocks = []
+    for value in positions[order] - offsets:
+        blocks.append([value, 1])
+        while len(blocks) > 1 and blocks[-2][0] > blocks[-1][0]:
+            (low, few), (high, many) = blocks[-2:]
+            blocks[-2:] = [[(low * few + high * many) / (few + many), few + many]]
+    moved = np.empty_like(positions)
+    moved[order] = np.concatenate([np.full(count, value) for value, count in blocks] or [[]]) + offsets
+    return moved
+
+
+def at_points(axes: Axes, labels: Mapping[str, tuple[float, float]], others: np.ndarray) -> list[Text]:
+    """Write labels {text: (x, y)} beside their points, where they cover least, farther ones with a line.
+
+    others (n, 2): further points of the axes to keep clear of.
+    """
+    axes.autoscale_view()  # transData would lag behind the data
+    points = axes.transData.transform(np.vstack([np.reshape(others, (-1, 2)), *labels.values()]))
+    texts = []
+    for text, place in labels.items():
+        label = axes.annotate(
+            text,
+            place,
+            (0, 0),
+            textcoords="offset points",
+            zorder=5,
+            path_effects=style.HALO,
+            arrowprops={"arrowstyle": "-", "linewidth": 0.4, "color": style.INK, "shrinkA": 0, "shrinkB": 3},
+        )
+        taken = [_moved(other) for other in texts]
+        frame, costs = axes.get_window_extent(), []
+        for distance, direction in itertools.product(DISTANCES, DIRECTIONS):
+            box = _moved(label, distance, direction)
+            covered = box.padded(2).count_contains(points) + 3 * box.count_overlaps(taken)
+            outside = not (frame.contains(*box.min) and frame.contains(*box.max))
+            costs.append((covered + 100 * outside + 0.15 * distance, distance, direction))
+        _moved(label, *min(costs, key=lambda cost: cost[0])[1:])
+        texts.append(label)
+    return texts
+
+
+def _moved(label, distance=None, direction=None):
+    """Box in pixels of a label's words, after moving it off its point (if asked to)."""
+    if direction is not None:
+        x, y = direction
+        label.set(position=(distance * x, distance * y), ha=ALIGN[np.sign(x)], va=ALIGN_UP[np.sign(y)])
+    label.update_positions(label.axes.figure.canvas.get_renderer())
+    return Text.get_window_extent(label)  # the label's own box holds its line as well
+
+
+def at_ends(axes: Axes, labels: Mapping[str, tuple[float, str]]) -> list[Text]:
+    """Write labels {text: (y, colour)} at the right of the axes, at the height of their lines.
+
+    Call when the limits of y are final.
+    """
+    height = axes.get_window_extent().height / axes.figure.dpi * 72
+    low, high = axes.get_ylim()
+    share = [(y - low) / (high - low) for y, _ in labels.values()]
+    at = spread(share, 8.5 / height)
+    return [
+        axes.annotate(
+            text,
+            (1, y),
+            xycoords="axes fraction",
+            xytext=(3, 0),
+            textcoords="offset points",
+            va="center",
+            color=colour,
+            annotation_clip=False,
+        )
+        for (text, (_, colour)), y in zip(labels.items(), at, strict=True)
+    ]
