@@ -171,19 +171,24 @@ def _simulate(given: argparse.Namespace) -> None:
     case.pop("code", None)
     given.output.parent.mkdir(parents=True, exist_ok=True)
     provenance.compile_solver()
-    from hopperopt import experiment, files
+    from hopperopt import dataset, experiment, files
     from hopperopt.progress import Reporter
 
     _stamp_files()
     with Reporter(sys.stderr) as progress:
-        dataset = experiment.run(case, progress=progress)
-    dataset.attrs |= {
+        run = experiment.run(case, progress=progress)
+    run.attrs |= {
         "case": json.dumps(case, sort_keys=True),
         "code_digest": provenance.code_digest(f"hopperopt.{SIMULATION}"),
         "seed": case["seed"],
     }
-    files.write_netcdf(dataset, given.output)
-    print(f"{given.output}: {dataset['status'].item()}", file=sys.stderr)
+    files.write_netcdf(run, given.output)
+    level, reached = 1e3 * case["filling"]["level"], 1e3 * float(run["filling_level"])
+    if abs(reached - level) > 1e3 * max(case["particles"]["diameters"]):
+        logging.warning(
+            f"the bed was {reached:.1f} mm high, not {level:g} mm (give or take a coarse particle)"
+        )
+    print(f"{given.output}: {dataset.outcome(run)}", file=sys.stderr)
 
 
 def _case(given: argparse.Namespace) -> dict:

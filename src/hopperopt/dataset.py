@@ -49,10 +49,11 @@ def read_runs(paths: Iterable) -> dict[tuple[str, int], xr.Dataset]:
 
 def unusable_runs(runs: Mapping[tuple[str, int], xr.Dataset]) -> dict[tuple[str, int], str]:
     """Reason, in words, for each run that is no data point: everything but status `complete`."""
-    return {key: _reason(run) for key, run in runs.items() if run["status"].item() != "complete"}
+    return {key: outcome(run) for key, run in runs.items() if run["status"].item() != "complete"}
 
 
-def _reason(run: xr.Dataset) -> str:
+def outcome(run: xr.Dataset) -> str:
+    """How a run ended: its status, and the numbers that explain it."""
     status = run["status"].item()
     inside = f"{float(run['residual_mass_fraction']):.1%} of the mass stayed inside"
     return {
@@ -63,7 +64,9 @@ def _reason(run: xr.Dataset) -> str:
         f"overlap {float(run['max_overlap']):.3g} of the smaller radius, "
         f"speed {float(run['max_speed_ratio']):.3g} of free fall, "
         f"{int(run['lost_particles'])} particles lost, energy gain {float(run['max_energy_gain']):.2%}",
-    }.get(status, status)
+        "complete": f"complete, empty after {float(run['discharge_time']):.3f} s"
+        + (f", {int(run['residual_count'])} particles stayed" if run["residual_count"] else ""),
+    }[status]
 
 
 def refusal(unusable: Mapping[tuple[str, int], str]) -> str:

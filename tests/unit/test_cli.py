@@ -3,19 +3,18 @@
 import json
 
 import pytest
-import xarray as xr
 
 from hopperopt import cli, experiment, files, provenance
 
 
 @pytest.fixture
-def simulated(monkeypatch, tmp_path):
+def simulated(monkeypatch, tmp_path, make_run):
     """Function that runs `simulate` with a solver that only writes down its case; returns case and file."""
     cases = []
 
     def run(case, progress=None):
         cases.append(case)
-        return xr.Dataset({"status": ((), "jammed")}, attrs={"wall_time_s": 1.0})
+        return make_run(status="jammed", stayed=20, filling_level=0.060).assign_attrs(wall_time_s=1.0)
 
     monkeypatch.setattr(experiment, "run", run)
     monkeypatch.setattr(provenance, "compile_solver", lambda: None)
@@ -51,10 +50,11 @@ def test_the_bare_hopper_has_no_insert(simulated):
     assert case["walls"]["insert"] is None and case["design"] == {}
 
 
-def test_a_jammed_simulation_is_a_result(simulated, capsys):
+def test_a_jammed_simulation_is_a_result(simulated, capsys, caplog):
     _, run = simulated()
     assert run["status"] == "jammed"
-    assert "jammed" in capsys.readouterr().err
+    assert "run.nc: jammed, 0.8% of the mass stayed inside" in capsys.readouterr().err
+    assert "60.0 mm high, not 74 mm" in caplog.text
 
 
 def test_the_workflows_case_runs_as_it_is(simulated):

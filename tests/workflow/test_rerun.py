@@ -81,10 +81,7 @@ factors:
   length_mm: {key: insert.cone.length_mm, levels: [50, 45, 40, 35, 30]}
   height_mm: {key: insert.height_mm, levels: [34, 32, 29.6, 28, 26]}
 """
-NO_SOLVER = {
-    "experiment.py": "\ndef run(case, progress=None):\n    return xr.Dataset({'status': ((), 'complete')})\n",
-    "provenance.py": "\ndef compile_solver():\n    pass\n",
-}
+NO_SOLVER = {"cli.py": "\ndef _simulate(given):\n    given.output.touch()\n"}
 
 
 def test_one_level_of_the_orthogonal_array_reruns_its_experiments(new_study, tmp_path):
