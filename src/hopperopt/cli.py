@@ -126,17 +126,13 @@ def _json(text: str) -> dict:
 def _run_stage(given: argparse.Namespace) -> None:
     """Call the stage's function with its parameters, inputs and outputs."""
     inputs = [getattr(given, option.rstrip("*")) for option in given.stage.inputs]
-    module = importlib.import_module(f"hopperopt.{given.stage.module}")
-    _stamp_files()
-    # A figure is one thing in several formats: it takes its outputs as one list.
-    outputs = [given.output] if given.stage.function == "write" else given.output
-    getattr(module, given.stage.function)(given.params, *inputs, *outputs)
-
-
-def _stamp_files() -> None:
     from hopperopt import files
 
-    files.stamp.update(provenance.attributes())
+    module = importlib.import_module(f"hopperopt.{given.stage.module}")
+    # A figure is one thing in several formats: it takes its outputs as one list.
+    outputs = [given.output] if given.stage.function == "write" else given.output
+    with files.stamped(provenance.attributes()):
+        getattr(module, given.stage.function)(given.params, *inputs, *outputs)
 
 
 def _add_simulate(command: argparse.ArgumentParser) -> None:
@@ -174,10 +170,9 @@ def _simulate(given: argparse.Namespace) -> None:
     from hopperopt import dataset, experiment, files
     from hopperopt.progress import Reporter
 
-    _stamp_files()
     with Reporter(sys.stderr) as progress:
         run = experiment.run(case, progress=progress)
-    run.attrs |= {
+    run.attrs |= provenance.attributes() | {
         "case": json.dumps(case, sort_keys=True),
         "code_digest": provenance.code_digest(f"hopperopt.{SIMULATION}"),
         "seed": case["seed"],

@@ -8,19 +8,30 @@ import os
 import secrets
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 import yaml
 
-# Attributes that every netCDF file written by this process gets, such as versions and host.
-stamp: dict[str, str] = {}
+_stamp: ContextVar[Mapping[str, str]] = ContextVar("stamp", default=MappingProxyType({}))
 
 
 class InputError(ValueError):
     """What a person gave cannot be used; the message is all that needs to be said."""
+
+
+@contextmanager
+def stamped(attributes: Mapping[str, str]) -> Iterator[None]:
+    """Give every netCDF file that is written inside these attributes, such as versions and host."""
+    token = _stamp.set(attributes)
+    try:
+        yield
+    finally:
+        _stamp.reset(token)
 
 
 @contextmanager
@@ -50,7 +61,7 @@ def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         if variable.dtype.kind == "f" and name in dataset.coords:
             encoding[name]["_FillValue"] = None
     with atomic(path) as temporary:
-        dataset.assign_attrs(dataset.attrs | stamp).to_netcdf(
+        dataset.assign_attrs(_stamp.get()).to_netcdf(
             temporary, engine="netcdf4", format="NETCDF4", encoding=encoding
         )
 

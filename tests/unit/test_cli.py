@@ -18,7 +18,6 @@ def simulated(monkeypatch, tmp_path, make_run):
 
     monkeypatch.setattr(experiment, "run", run)
     monkeypatch.setattr(provenance, "compile_solver", lambda: None)
-    monkeypatch.setattr(files, "stamp", {})
     monkeypatch.chdir(tmp_path)
     (tmp_path / "config.yaml").write_text("filling: {particles: 60}\n")
 

@@ -31,6 +31,14 @@ def test_netcdf_comes_back_identical(tmp_path):
     }
 
 
+def test_files_are_stamped_while_asked_for(tmp_path):
+    with files.stamped({"host": "here"}):
+        files.write_netcdf(sample(), tmp_path / "with.nc")
+    files.write_netcdf(sample(), tmp_path / "without.nc")
+    assert files.read_netcdf(tmp_path / "with.nc").attrs == sample().attrs | {"host": "here"}
+    assert files.read_netcdf(tmp_path / "without.nc").attrs == sample().attrs
+
+
 def test_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):
     path = tmp_path / "run.nc"
     files.write_netcdf(sample(), path)

@@ -109,6 +109,15 @@ def verification_params(wildcards):
     return as_json(verification_case(wildcards), cli.SIMULATION)
 
 
+def simulation_resources():
+    """Memory (MB) and time (minutes) granted to a simulation, a few times what it takes."""
+    name, design = next(iter(DESIGNS.items()))
+    case = case_of(json.dumps(design), name, 1)
+    particles = sum(case["particles"]["counts"])
+    steps = (case["filling"]["settling_limit"] + 3.0) / case["time_step"]
+    return {"mem_mb": 1000 + particles // 500, "runtime": 10 + round(particles * steps / 2e6 / 60)}
+
+
 def verification_runs(case):
     """Files of a verification case's runs."""
     replicates = range(1, STUDY.verification.replicates + 1)

@@ -10,7 +10,6 @@ rule simulate:
         case=experiment_params,
     threads: 1
     resources:
-        mem_mb=1000,
-        runtime=60,
+        **simulation_resources(),
     shell:
         "python -m hopperopt simulate --case {params.case:q} --output {output:q} > {log:q} 2>&1"

@@ -12,8 +12,7 @@ rule verify_simulate:
         case=verification_params,
     threads: 1
     resources:
-        mem_mb=1000,
-        runtime=60,
+        **simulation_resources(),
     shell:
         "python -m hopperopt simulate --case {params.case:q} --design {input.design:q} "
         "--output {output:q} > {log:q} 2>&1"
