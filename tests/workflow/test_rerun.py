@@ -2,7 +2,11 @@
 
 import shutil
 
+import pytest
+
 from hopperopt import config
+
+pytestmark = pytest.mark.slow
 
 FIGURES = {f"figure_{name}" for name in ("hopper", "curves", "fit", "verification", "front", "errors")}
 PLAN_RUNS = {f"simulate exp_0{number}_rep_1" for number in range(1, 6)}

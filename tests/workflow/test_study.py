@@ -10,6 +10,8 @@ import xarray as xr
 
 from hopperopt import files
 
+pytestmark = pytest.mark.slow
+
 OUTPUTS = """
     design.csv dataset.nc runs.csv surrogate/training.nc surrogate/network.nc surrogate/errors.csv
     optimum/front.csv optimum/history.nc optimum/selected.yaml verification/summary.csv

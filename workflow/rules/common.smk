@@ -21,7 +21,7 @@ except configuration.ConfigError as error:
     raise WorkflowError(f"the configuration cannot be used:\n{error}") from None
 if workflow.is_main_process:
     for warning in STUDY.warnings():
-        logger.warning(warning)
+        logger.warning(f"Warning: {warning}")
 
 DESIGNS = dict(STUDY.experiments())
 EXPERIMENTS = list(DESIGNS)
