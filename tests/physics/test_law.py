@@ -137,10 +137,42 @@ def test_stuck_contact_swings_at_mindlins_frequency(simulate, wall_law, hertz, r
 
 def test_stored_energy_is_the_work_of_the_elastic_forces(wall_law, hertz):
     """Integrals of F_el over delta and of S_t xi over xi."""
-    law = wall_law(1.0)
-    deep = np.linspace(0.0, 3.0e-5, 20_001)
-    work = np.trapezoid(hertz.force(deep, RADIUS, law.modulus), deep)
-    assert elastic_energy(deep[-1], (0.0, 0.0, 0.0), RADIUS, law) == pytest.approx(work, rel=1e-6)
-    _, _, force, _ = law_of(law, deep[-1], (0.0, 0.0, 0.0), (0.0, 1.0e-8, 0.0), dt=1e-12)
-    extra = elastic_energy(deep[-1], (0.0, 1.0e-8, 0.0), RADIUS, law) - work
-    assert extra == pytest.approx(-force[1] * 1.0e-8 / 2.0, rel=1e-3)
+    law, deep, stretch = wall_law(1.0, friction=100.0), 3.0e-5, (0.0, 3.0e-5, 0.0)
+    steps = np.linspace(0.0, deep, 20_001)
+    work = np.trapezoid(hertz.force(steps, RADIUS, law.modulus), steps)
+    stored = elastic_energy(deep, (0.0, 0.0, 0.0), RADIUS, law)
+    assert stored / work == pytest.approx(1.0, rel=1e-6)
+    _, _, force, _ = law_of(law, deep, (0.0, 0.0, 0.0), stretch)
+    more = elastic_energy(deep, stretch, RADIUS, law) - stored
+    assert more / (-force[1] * stretch[1] / 2.0) == pytest.approx(1.0, rel=1e-9)
+
+
+def test_surfaces_that_move_together_do_not_rub(simulate, pair_law, wall_law):
+    """Lever arms are R - delta at a wall and R - delta / 2 between spheres, in the relative velocity too."""
+    deep = 2.0e-4
+    arm = RADIUS - deep
+    sim = simulate(
+        [[0.05, 0.0, arm]],
+        RADIUS,
+        [[arm * 30.0, -arm * 20.0, 0.0]],
+        walls=FLOOR,
+        wall=wall_law(1.0),
+        time_step=1.0e-9,
+        spin=[[20.0, 30.0, 0.0]],
+    )
+    sim.advance(1)
+    force = sim.spheres.force[0]
+    assert force[2] > 0.1 and np.abs(force[:2]).max() < 1e-12 * force[2]
+    radii = np.array([0.002, 0.001])
+    arms = radii - deep / 2.0
+    spin = np.array([[20.0, 30.0, 7.0], [-20.0, -30.0, -3.0]]) / arms[:, None] * 1e-3
+    sim = simulate(
+        [[0.0, 0.0, 0.0], [0.0, 0.0, radii.sum() - deep]],
+        radii,
+        pair=pair_law(1.0),
+        time_step=1.0e-9,
+        spin=spin,
+    )
+    sim.advance(1)
+    force = sim.by_identity(sim.spheres.force)
+    assert force[1, 2] > 0.1 and np.abs(force[:, :2]).max() < 1e-12 * force[1, 2]

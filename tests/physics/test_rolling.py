@@ -114,6 +114,20 @@ def test_cdt_torque_is_opposite_on_both_bodies(pressed_pair):
     assert inertia[1] * change[1] == pytest.approx(-expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("model", ["edem", "cdt"])
+def test_rolling_torque_at_a_wall(simulate, wall_law, hertz, model):
+    """mu_r N l with l = R - delta against omega, for both models; spin across the normal."""
+    deep, spin, dt = 2.0e-4, np.array([30.0, -40.0, 0.0]), 1.0e-8
+    law = wall_law(1.0, 0.0, 0.1)
+    sim = simulate(
+        [[0.05, 0.0, RADIUS - deep]], RADIUS, walls=FLOOR, wall=law, time_step=dt, rolling=model, spin=[spin]
+    )
+    sim.advance(1)
+    braking = 0.1 * hertz.force(deep, RADIUS, law.modulus) * (RADIUS - deep)
+    expected = -braking / INERTIA * spin / np.linalg.norm(spin)
+    assert (sim.spheres.spin[0] - spin) / dt == pytest.approx(expected, rel=1e-6)
+
+
 def test_edem_brakes_each_body_along_its_own_spin(pressed_pair):
     """mu_r N l_i against omega_i on one, mu_r N l_j against omega_j on the other; n does not matter."""
     spin = np.array([[30.0, 20.0, -10.0], [5.0, -40.0, 20.0]])

@@ -37,13 +37,13 @@ RADIUS_I, RADIUS_J, MASS_I, MASS_J = 38, 39, 40, 41
 ROWS = 42
 
 
-@njit
+@njit(cache=True)
 def make_block():
     """A zeroed block buffer."""
     return np.zeros(ROWS * STRIDE)
 
 
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def apply_law(block, lanes, law, dt):
     """Forces of `lanes` contacts from the gathered rows: the law of `laws.hertz_mindlin`, lane by lane."""
     for q in range(lanes):
@@ -69,7 +69,7 @@ def apply_law(block, lanes, law, dt):
         block[WORST * STRIDE + q] = ratio if ratio > worst else worst
 
 
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def roll_cdt(block, lanes, law, arm):
     """Rolling torques of the `cdt` model; `arm`: row of the lever arm, R* of pairs, l_i at walls."""
     for q in range(lanes):
@@ -85,14 +85,14 @@ def roll_cdt(block, lanes, law, arm):
         block[RZ * STRIDE + q] = t[2]
 
 
-@njit
+@njit(cache=True)
 def note_overlaps(block, monitors):
     """Move the block's largest overlap ratio into the monitors."""
     for q in range(LANES):
         monitors[OVERLAP] = max(monitors[OVERLAP], block[WORST * STRIDE + q])
 
 
-@njit
+@njit(cache=True)
 def find_contacts(spheres, pairs, count):
     """List the pairs in touch in `pairs.contact`. Returns their number."""
     position, radius = spheres.position, spheres.radius
@@ -110,7 +110,7 @@ def find_contacts(spheres, pairs, count):
     return found
 
 
-@njit
+@njit(cache=True)
 def gather_pairs(spheres, pairs, block, begin, lanes, step):
     """Copy the states of the contacts `begin ... begin + lanes` into the block.
 
@@ -137,7 +137,7 @@ def gather_pairs(spheres, pairs, block, begin, lanes, step):
         block[MASS_J * STRIDE + q] = mass[j]
 
 
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def meet_pairs(block, lanes):
     """Geometry and relative surface velocity of gathered pairs.
 
@@ -170,7 +170,7 @@ def meet_pairs(block, lanes):
         block[ARM_J * STRIDE + q] = l_j
 
 
-@njit
+@njit(cache=True)
 def scatter_pairs(spheres, pairs, block, begin, lanes, rolling, friction):
     """Add the block's forces and torques to both spheres of each contact; keep the springs."""
     force, torque, rolling_limit = spheres.force, spheres.torque, spheres.rolling_limit
@@ -196,7 +196,7 @@ def scatter_pairs(spheres, pairs, block, begin, lanes, rolling, friction):
                 torque[j, a] -= block[(RX + a) * STRIDE + q]
 
 
-@njit
+@njit(cache=True)
 def pair_forces(spheres, pairs, counters, block, settings):
     """Add the forces between spheres in touch. Returns the number of contacts."""
     contacts = find_contacts(spheres, pairs, counters[COUNT])
@@ -212,7 +212,7 @@ def pair_forces(spheres, pairs, counters, block, settings):
     return contacts
 
 
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def deepest(walls, first, last, r, z, radius):
     """Which of the elements first ... last of a surface a sphere overlaps most.
 
@@ -230,7 +230,7 @@ def deepest(walls, first, last, r, z, radius):
     return found, radius - distance, n_r / distance, n_z / distance
 
 
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def gather_touch(spheres, touches, block, q, i, k, delta, n_r, n_z):
     """Fill lane q with sphere i against the wall of entry k: l_i = R_i - delta, a wall at rest."""
     x, y = spheres.position[i, 0], spheres.position[i, 1]
@@ -252,7 +252,7 @@ def gather_touch(spheres, touches, block, q, i, k, delta, n_r, n_z):
     block[ARM_I * STRIDE + q] = arm
 
 
-@njit
+@njit(cache=True)
 def scatter_touches(spheres, touches, walls, block, rows, entries, lanes, rolling, friction):
     """Add the block's forces and torques to the spheres, the reactions to the walls; keep the springs."""
     for q in range(lanes):
@@ -272,7 +272,7 @@ def scatter_touches(spheres, touches, walls, block, rows, entries, lanes, rollin
                 spheres.torque[i, a] += block[(RX + a) * STRIDE + q]
 
 
-@njit
+@njit(cache=True)
 def wall_block(spheres, touches, walls, block, rows, entries, lanes, settings):
     """The law for `lanes` gathered wall contacts, and its scatter."""
     law = settings.wall_law
@@ -282,7 +282,7 @@ def wall_block(spheres, touches, walls, block, rows, entries, lanes, settings):
     scatter_touches(spheres, touches, walls, block, rows, entries, lanes, settings.rolling, law.rolling)
 
 
-@njit
+@njit(cache=True)
 def wall_forces(spheres, touches, walls, counters, block, settings):
     """Add the forces between spheres and walls. Returns the number of contacts."""
     walls.force[:] = 0.0

@@ -8,7 +8,7 @@ from hopperopt.dem.laws import braked
 from hopperopt.dem.state import COUNT, OPENED, PARKED, SPEED, STALE, STEP
 
 
-@njit
+@njit(cache=True)
 def clear_forces(spheres, count):
     """Zero the sums of the contacts."""
     spheres.force[:count] = 0.0
@@ -16,7 +16,7 @@ def clear_forces(spheres, count):
     spheres.rolling_limit[:count] = 0.0
 
 
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def kick_and_drift(spheres, counters, monitors, settings):
     """Advance velocities and spins by one step's forces, brake the spins, then move the spheres.
 
@@ -62,7 +62,7 @@ def kick_and_drift(spheres, counters, monitors, settings):
     return beyond
 
 
-@njit
+@njit(cache=True)
 def take_out(spheres, exit_time, counters, settings):
     """Park the spheres whose centre crossed the sensor in this step; their exit times by interpolation (s).
 

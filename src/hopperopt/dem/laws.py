@@ -15,7 +15,7 @@ from numba import njit
 TINY = 1.0e-300  # keeps 0 / 0 away
 
 
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def hertz_mindlin(delta, n, v, xi, radius, mass, law, dt):
     """Force of one contact on the sphere that n points to, and its spring after the step.
 
@@ -63,7 +63,7 @@ def hertz_mindlin(delta, n, v, xi, radius, mass, law, dt):
     return normal, load, (keep * fx, keep * fy, keep * fz), (x, y, z)
 
 
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def elastic_energy(delta, xi, radius, law):
     """Energy stored in a contact's two springs, J: 2/5 F_el delta + 1/2 S_t xi^2."""
     a = math.sqrt(radius * delta)
@@ -71,7 +71,7 @@ def elastic_energy(delta, xi, radius, law):
     return normal + 4.0 * law.shear_modulus * a * (xi[0] ** 2 + xi[1] ** 2 + xi[2] ** 2)
 
 
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def directional_torque(n, w, torque):
     """Rolling torque of the `cdt` model: `torque` (N m) against the relative spin w, without its part along
     n.
@@ -87,7 +87,7 @@ def directional_torque(n, w, torque):
     )
 
 
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def braked(spin, limit, inertia, dt):
     """Factor on a spin (3-tuple) after rolling friction of at most `limit` (N m) has braked it for one step.
 

@@ -16,7 +16,7 @@ from hopperopt.dem.state import COUNT, NEEDED, NEVER, PAIR_CARRIED, PARKED, REMO
 CELLS_PER_SPHERE = 8  # a coarser grid is used beyond, so that one sphere far away costs no memory
 
 
-@njit
+@njit(cache=True)
 def carry_pairs(spheres, pairs, counters):
     """Set the springs of touching pairs aside, under the identities of the two spheres."""
     found = 0
@@ -31,7 +31,7 @@ def carry_pairs(spheres, pairs, counters):
     counters[PAIR_CARRIED] = found
 
 
-@njit
+@njit(cache=True)
 def drop_parked(spheres, counters):
     """Close the gaps that removed spheres left; the order of the others stays."""
     kept = 0
@@ -51,7 +51,7 @@ def drop_parked(spheres, counters):
     counters[COUNT] = kept
 
 
-@njit
+@njit(cache=True)
 def grow_skins(spheres, count, settings):
     """Reference positions and skins for the lists about to be built. Returns the largest skin, m."""
     largest = 0.0
@@ -66,7 +66,7 @@ def grow_skins(spheres, count, settings):
     return largest
 
 
-@njit
+@njit(cache=True)
 def make_grid(spheres, count, reach):
     """Cells of at least `reach` (m) around the spheres. Returns (corner (3,), cell size, cells along x, y,
     z)."""
@@ -86,7 +86,7 @@ def make_grid(spheres, count, reach):
         size *= 1.25
 
 
-@njit
+@njit(cache=True)
 def sort_by_cell(spheres, count, corner, size, cells):
     """Permute the rows into cell order. Returns the first row of each cell, (cells + 1,)."""
     index = np.empty(count, np.int64)
@@ -119,7 +119,7 @@ def sort_by_cell(spheres, count, corner, size, cells):
     return first
 
 
-@njit
+@njit(cache=True)
 def list_pairs(spheres, pairs, count, first, corner, size, cells):
     """Fill the half list. Returns the entries needed; it is whole where these are fewer than the capacity.
 
@@ -157,7 +157,7 @@ def list_pairs(spheres, pairs, count, first, corner, size, cells):
     return found
 
 
-@njit
+@njit(cache=True)
 def restore_pairs(spheres, pairs, counters):
     """Put the springs set aside into the new list; a pair whose order flipped changes its sign."""
     count = counters[COUNT]
@@ -181,7 +181,7 @@ def restore_pairs(spheres, pairs, counters):
                 break
 
 
-@njit
+@njit(cache=True)
 def rebuild_pairs(spheres, pairs, counters, settings):
     """Sort the spheres and list their neighbours. Returns False when the list's capacity is too small.
 

@@ -10,7 +10,7 @@ from hopperopt.dem.laws import elastic_energy
 from hopperopt.dem.state import COUNT
 
 
-@njit
+@njit(cache=True)
 def motion_energies(spheres, counters, settings):
     """Kinetic (translation and spin) and gravitational energy, J.
 
@@ -28,7 +28,7 @@ def motion_energies(spheres, counters, settings):
     return kinetic, potential
 
 
-@njit(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def spring_energy(spheres, pairs, touches, walls, counters, settings):
     """Elastic energy of all contacts with the springs of the last step, J, half a step back like the
     motion."""

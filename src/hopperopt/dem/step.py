@@ -12,7 +12,7 @@ DONE, PAIRS_FULL, TOUCHES_FULL, NOT_FINITE = range(4)
 NOTHING_CARRIED = -1
 
 
-@njit
+@njit(cache=True)
 def rebuild(spheres, pairs, touches, walls, counters, settings):
     """New lists in a new order, histories carried through. Returns DONE or what stopped it.
 
@@ -39,7 +39,7 @@ def rebuild(spheres, pairs, touches, walls, counters, settings):
     return DONE
 
 
-@njit
+@njit(cache=True)
 def step(spheres, pairs, touches, walls, exit_time, counters, monitors, block, settings):
     """One time step: forces at the positions, then leapfrog. Velocities live at half steps."""
     clear_forces(spheres, counters[COUNT])
@@ -50,7 +50,7 @@ def step(spheres, pairs, touches, walls, exit_time, counters, monitors, block, s
         take_out(spheres, exit_time, counters, settings)
 
 
-@njit
+@njit(cache=True)
 def advance(spheres, pairs, touches, walls, exit_time, counters, monitors, settings, steps):
     """Run up to `steps` steps. Returns (DONE or what stopped it, steps done)."""
     block = make_block()

@@ -162,7 +162,7 @@ def open_wall(walls, touches, entries, profile):
     touches.spring[:entries][lost] = 0.0
 
 
-@njit
+@njit(cache=True)
 def nearest(walls, e, r, z):
     """Vector (r, z) in m from the closest point of element e to a sphere centre, and whether e is it.
 
@@ -183,7 +183,7 @@ def nearest(walls, e, r, z):
     return dr, dz, beyond
 
 
-@njit
+@njit(cache=True)
 def surface_boxes(walls):
     """Bounding boxes of the surfaces in the meridian plane, (surfaces, 4): r from, to, z from, to (m).
 
@@ -201,7 +201,7 @@ def surface_boxes(walls):
     return boxes
 
 
-@njit
+@njit(cache=True)
 def elements_within(walls, s, r, z, reach):
     """First and last element of surface s that come within `reach` (m) of a point; -1, -1 for none."""
     first = last = -1
@@ -217,7 +217,7 @@ def elements_within(walls, s, r, z, reach):
     return first, last
 
 
-@njit
+@njit(cache=True)
 def carry_touches(spheres, touches, counters):
     """Set the springs of touching walls aside, under the sphere's identity and the surface."""
     found = 0
@@ -233,7 +233,7 @@ def carry_touches(spheres, touches, counters):
     counters[TOUCH_CARRIED] = found
 
 
-@njit
+@njit(cache=True)
 def list_touches(spheres, touches, walls, count):
     """Fill the wall list. Returns the entries needed; beyond the capacity nothing is written."""
     capacity = len(touches.surface)
@@ -264,7 +264,7 @@ def list_touches(spheres, touches, walls, count):
     return found
 
 
-@njit
+@njit(cache=True)
 def restore_touches(spheres, touches, counters):
     """Put the springs set aside into the new wall list."""
     count = counters[COUNT]
@@ -286,7 +286,7 @@ def restore_touches(spheres, touches, counters):
                     touches.spring[k, a] = touches.carried_spring[c, a]
 
 
-@njit
+@njit(cache=True)
 def rebuild_touches(spheres, touches, walls, counters):
     """List the spheres near walls, after `rebuild_pairs`. Returns False when the capacity is too small."""
     needed = list_touches(spheres, touches, walls, counters[COUNT])
