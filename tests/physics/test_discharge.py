@@ -119,6 +119,30 @@ def test_all_that_was_filled_is_discharged(bed):
     assert bed.max_overlap < 0.3 and bed.max_speed_ratio < 2.0
 
 
+def test_those_who_stay_remain_who_they_are(bed):
+    """Rows close up and are sorted again when spheres have left: each keeps its own size, mass and motion."""
+    names = ("radius", "mass", "position", "velocity", "spin")
+
+    def states():
+        return {name: bed.by_identity(getattr(bed.spheres, name)) for name in names}
+
+    bed.open("gate", -0.012)
+    while bed.count > 1000 and bed.time < 1.0:
+        bed.advance(100)
+    before, steps = states(), 0
+    while bed.count > 990 or bed.rows > bed.count:
+        bed.advance(1)
+        steps += 1
+        assert steps < 1000
+    after, inside = states(), np.isnan(bed.exit_time)
+    assert (after["radius"] == before["radius"])[inside].all()
+    assert (after["mass"] == before["mass"])[inside].all()
+    time = steps * bed.settings.time_step
+    assert np.abs(after["position"] - before["position"])[inside].max() < 2.0 * time
+    assert np.abs(after["velocity"] - before["velocity"])[inside].mean() < 2.0 * G * time
+    assert np.abs(after["spin"] - before["spin"])[inside].mean() < 2.0 * G * time / 0.0015
+
+
 def test_overlap_monitor_holds_the_deepest_impact(simulate, pair_law, wall_law, hertz):
     """Over the smaller radius; the largest of all so far, of pairs and of walls."""
     radii, speed, density = np.array([0.002, 0.001]), 0.6, 2285.0
