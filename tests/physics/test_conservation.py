@@ -140,6 +140,43 @@ def test_single_bounce_on_a_wall_keeps_the_energy(simulate, wall_law):
     assert np.abs(energies.sum(axis=1) - energies[0].sum()).max() < 1e-3 * fall
 
 
+def test_free_fall_keeps_the_energy_at_any_step(simulate):
+    """Heights are taken where the velocities are, half a step back: then leapfrog's sum is exact."""
+    sim = simulate([[0.0, 0.0, 1.0]], 0.001, [[1.0, 0.0, 2.0]], gravity=9.81)
+    energies = []
+    for _ in range(50):
+        sim.advance(200)
+        energies.append(sim.energy())
+    kinetic, potential, elastic = np.array(energies).T
+    assert np.ptp(potential) > 0.1 * kinetic.max() and not elastic.any()
+    assert np.ptp(kinetic + potential) < 1e-12 * kinetic.max()
+
+
+def test_a_contact_that_ended_holds_no_energy(simulate):
+    """Spheres that rubbed, parted and meet again: elastic energy as of two that never met, in every phase."""
+    radius = 0.002
+    for phase in np.linspace(0.0, 1.0, 8):
+        sim = simulate([[0.0, 0.0, 0.0], [0.0, 0.0, 0.00398]], radius, [[0.05, 0.0, 0.0], [0.0, 0.0, 0.0]])
+        sim.advance(3)  # stretches the spring
+        x, v, spheres = sim.spheres.position, sim.spheres.velocity, sim.spheres
+        top, bottom = np.argsort(-x[:, 2])
+        v[:], spheres.spin[:] = 0.0, 0.0
+        v[top, 2] = 0.01  # apart, within each other's list
+        sim.advance(40)
+        assert sim.energy()[2] == 0.0
+        n = (x[top] - x[bottom]) / np.linalg.norm(x[top] - x[bottom])
+        v[:], v[top], spheres.spin[:] = 0.0, -0.01 * n, 0.0
+        x[top] = x[bottom] + (2.0 * radius + 4.0e-6 + phase * 4.0e-7) * n
+        fresh = simulate(x.copy(), radius, v.copy())
+        met = 0
+        for _ in range(15):
+            sim.advance(1)
+            fresh.advance(1)
+            assert sim.energy()[2] == pytest.approx(fresh.energy()[2], rel=1e-6, abs=1e-30)
+            met += fresh.energy()[2] > 0.0
+        assert met
+
+
 def test_walls_feel_what_the_spheres_feel(simulate):
     """The forces on all walls are minus the sum of the forces on all spheres (forces in pairs cancel)."""
     rng = np.random.default_rng(5)

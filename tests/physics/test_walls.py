@@ -93,6 +93,30 @@ def test_convex_edge_gives_one_contact(push, one_contact, direction):
     assert force == pytest.approx(one_contact() * np.array(away), rel=1e-9)
 
 
+@pytest.mark.parametrize("inward", [1e-6, 0.001])
+@pytest.mark.parametrize("turn", [60.0, 120.0, 160.0])
+@pytest.mark.parametrize("first", [True, False])
+def test_beside_a_convex_edge_only_the_face_is_touched(push, one_contact, inward, turn, first):
+    """The edge is nearer than the radius, too, but it is not the closest point."""
+    fall = np.radians(turn / 2.0)
+    roof = {
+        "roof": [
+            [0.1 - 0.02 * np.cos(fall), -0.02 * np.sin(fall)],
+            [0.1, 0.0],
+            [0.1 + 0.02 * np.cos(fall), -0.02 * np.sin(fall)],
+        ]
+    }
+    side = -1.0 if first else 1.0
+    normal = np.array([side * np.sin(fall), np.cos(fall)])
+    r, z = (
+        np.array([0.1, 0.0])
+        + inward * np.array([side * np.cos(fall), -np.sin(fall)])
+        + (RADIUS - DEEP) * normal
+    )
+    force = push(roof, meridian(r, z, 0.0))
+    assert force[[0, 2]] == pytest.approx(one_contact() * normal, rel=1e-6)
+
+
 @pytest.mark.parametrize(
     "shape",
     [
