@@ -20,32 +20,34 @@ def scatter(radii, column_radius, bottom, solid_fraction, generator):
     height = 4.0 / 3.0 * np.pi * np.sum(radii**3) / (solid_fraction * np.pi * column_radius**2)
     low = bottom + radii.max()
     out = np.empty((len(radii), 3))
-    order = np.argsort(-radii, kind="stable")
-    placed, waiting = order[:0], order
-    for _ in range(ROUNDS):
-        if not len(waiting):
-            return out
-        r = column_radius * np.sqrt(generator.random(len(waiting)))
-        angle = 2.0 * np.pi * generator.random(len(waiting))
-        z = low + height * generator.random(len(waiting))
-        proposed = np.column_stack([r * np.cos(angle), r * np.sin(angle), z])
-        free = _free(proposed, radii[waiting], out[placed], radii[placed])
-        out[waiting[free]] = proposed[free]
-        placed, waiting = np.concatenate([placed, waiting[free]]), waiting[~free]
-    raise ValueError(f"{len(waiting)} spheres found no room at a solid fraction of {solid_fraction:g}")
+    placed = np.empty(0, dtype=int)
+    for size in np.unique(radii)[::-1]:
+        waiting = np.flatnonzero(radii == size)
+        for _ in range(ROUNDS):
+            if not len(waiting):
+                break
+            r = column_radius * np.sqrt(generator.random(len(waiting)))
+            angle = 2.0 * np.pi * generator.random(len(waiting))
+            z = low + height * generator.random(len(waiting))
+            proposed = np.column_stack([r * np.cos(angle), r * np.sin(angle), z])
+            free = _free(proposed, size, out[placed], radii[placed])
+            out[waiting[free]] = proposed[free]
+            placed, waiting = np.concatenate([placed, waiting[free]]), waiting[~free]
+        if len(waiting):
+            raise ValueError(f"{len(waiting)} spheres found no room at a solid fraction of {solid_fraction:g}")
+    return out
 
 
-def _free(proposed, radii, others, other_radii):
-    """Which of the proposed spheres overlap neither any other sphere nor a proposed one before them."""
+def _free(proposed, radius, others, other_radii):
+    """Which of the proposed equal spheres overlap neither any other sphere nor a proposed one before them."""
     from scipy.spatial import cKDTree
 
     free = np.ones(len(proposed), dtype=bool)
     tree = cKDTree(proposed)
     if len(others):
-        reach = radii.max() + other_radii.max()
+        reach = radius + other_radii.max()
         near = tree.sparse_distance_matrix(cKDTree(others), reach, output_type="ndarray")
-        free[near["i"][near["v"] < radii[near["i"]] + other_radii[near["j"]]]] = False
-    i, j = tree.query_pairs(2.0 * radii.max(), output_type="ndarray").T
-    apart = np.linalg.norm(proposed[i] - proposed[j], axis=1)
-    free[np.maximum(i, j)[apart < radii[i] + radii[j]]] = False
+        free[near["i"][near["v"] < radius + other_radii[near["j"]]]] = False
+    pairs = tree.query_pairs(2.0 * radius, output_type="ndarray")
+    free[pairs.max(axis=1)] = False
     return free
