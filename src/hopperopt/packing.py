@@ -34,7 +34,7 @@ def scatter(radii, column_radius, bottom, solid_fraction, generator):
             out[waiting[free]] = proposed[free]
             placed, waiting = np.concatenate([placed, waiting[free]]), waiting[~free]
         if len(waiting):
-            raise ValueError(f"{len(waiting)} spheres found no room at a solid fraction of {solid_fraction:g}")
+            raise ValueError(f"no room for {len(waiting)} spheres at a solid fraction of {solid_fraction:g}")
     return out
 
 

@@ -7,7 +7,7 @@ from numba import njit
 
 from hopperopt.dem.contacts import deepest
 from hopperopt.dem.laws import elastic_energy
-from hopperopt.dem.state import COUNT
+from hopperopt.dem.state import COUNT, STEP
 
 
 @njit(cache=True)
@@ -45,9 +45,10 @@ def spring_energy(spheres, pairs, touches, walls, counters, settings):
             r_i, r_j = spheres.radius[i], spheres.radius[j]
             delta = r_i + r_j - math.sqrt(squared)
             if delta > 0.0:
-                xi = pairs.spring[k]
+                held = 1.0 if pairs.touched[k] == counters[STEP] - 1 else 0.0
+                x, y, z = pairs.spring[k, 0], pairs.spring[k, 1], pairs.spring[k, 2]
                 total += elastic_energy(
-                    delta, (xi[0], xi[1], xi[2]), r_i * r_j / (r_i + r_j), settings.pair_law
+                    delta, (held * x, held * y, held * z), r_i * r_j / (r_i + r_j), settings.pair_law
                 )
         for k in range(touches.start[i], touches.start[i + 1]):
             x = spheres.position[i, 0] - half * spheres.velocity[i, 0]
