@@ -42,6 +42,7 @@ def draw(errors: pd.DataFrame) -> Figure:
                 panel.plot(errors["hidden"], values, **look, clip_on=False)
                 ends[use.replace("_", "-")] = (values.iloc[-1], look["color"])
         panel.set_ylim(0)
+        panel.locator_params(axis="y", nbins=5)
         panel.set_title(f"rms error of {style.SYMBOLS[name]}", loc="left")
         labels.at_ends(panel, ends)
         for hidden in errors.loc[errors["selected"].astype(bool), "hidden"]:

@@ -81,7 +81,7 @@ def _half_way(run):
 def _limits(walls, position, sensor):
     """Left, right, bottom and top (mm) of what is shown: particles, insert, and the way to the sensor."""
     widest = walls["hopper"][:, 0].max() + MARGIN
-    top = np.nanmax(position[:, 2])
+    top = np.nanquantile(position[:, 2], 0.999)  # a few may still hop on the bed
     if "insert" in walls:
         top = max(top, walls["insert"][:, 1].max())
     return -widest, widest, sensor - 2 * MARGIN, top + 3 * MARGIN

@@ -38,9 +38,10 @@ def at_points(axes: Axes, labels: Mapping[str, tuple[float, float]], others: np.
     others (n, 2): further points of the axes to keep clear of.
     """
     axes.autoscale_view()  # transData would lag behind the data
-    points = axes.transData.transform(np.vstack([np.reshape(others, (-1, 2)), *labels.values()]))
-    texts = []
-    for text, place in labels.items():
+    own = axes.transData.transform(np.reshape(list(labels.values()), (-1, 2)))
+    points = np.vstack([axes.transData.transform(np.reshape(others, (-1, 2))), own])
+    frame, texts = axes.get_window_extent(), []
+    for index, (text, place) in enumerate(labels.items()):
         label = axes.annotate(
             text,
             place,
@@ -48,18 +49,26 @@ def at_points(axes: Axes, labels: Mapping[str, tuple[float, float]], others: np.
             textcoords="offset points",
             zorder=5,
             path_effects=style.HALO,
-            arrowprops={"arrowstyle": "-", "linewidth": 0.4, "color": style.INK, "shrinkA": 0, "shrinkB": 3},
+            arrowprops={"arrowstyle": "-", "linewidth": 0.4, "color": style.INK, "shrinkA": 0, "shrinkB": 4},
         )
-        taken = [_moved(other) for other in texts]
-        frame, costs = axes.get_window_extent(), []
+        taken, costs = [_moved(other) for other in texts], []
         for distance, direction in itertools.product(DISTANCES, DIRECTIONS):
             box = _moved(label, distance, direction)
             covered = box.padded(2).count_contains(points) + 3 * box.count_overlaps(taken)
+            misleading = np.argmin(_distances(box, own)) != index
             outside = not (frame.contains(*box.min) and frame.contains(*box.max))
-            costs.append((covered + 100 * outside + 0.15 * distance, distance, direction))
-        _moved(label, *min(costs, key=lambda cost: cost[0])[1:])
+            cost = covered + 10 * misleading + 100 * outside + 0.15 * distance
+            costs.append((cost, distance, direction))
+        _, distance, direction = min(costs, key=lambda choice: choice[0])
+        _moved(label, distance, direction)
+        label.arrow_patch.set_visible(distance > DISTANCES[0])
         texts.append(label)
     return texts
+
+
+def _distances(box, points):
+    """Distances (n,) of points (n, 2) from a box."""
+    return np.linalg.norm(np.maximum(np.maximum(box.min - points, points - box.max), 0), axis=1)
 
 
 def _moved(label, distance=None, direction=None):
