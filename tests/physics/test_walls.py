@@ -273,6 +273,20 @@ def test_opening_drops_the_gates_history_only(bed, springs):
     assert all((walls_after[key] == kept[key]).all() for key in kept)
 
 
+def test_rim_inherits_nothing_from_the_gate(simulate, springs):
+    """Where gate and bottom are one plane, a sphere beside the rim touches it anew once the gate is gone."""
+    walls = {"hopper": [[0.01, 0.0], [0.03, 0.0], [0.03, 0.08]], "gate": [[0.0, 0.0], [0.01, 0.0]]}
+    position = [0.01 - 1e-4, 0.0, RADIUS - DEEP]
+    sim = simulate([position], RADIUS, [[0.0, 1e-3, 0.0]], walls=walls)
+    sim.advance(1)
+    assert np.linalg.norm(springs(sim)[1][0, "gate"]) > 1e-9
+    sim.spheres.velocity[:], sim.spheres.spin[:] = 0.0, 0.0
+    sim.spheres.position[0] = position
+    sim.open("gate", -1.0)
+    sim.advance(1)
+    assert np.linalg.norm(springs(sim)[1][0, "hopper"]) < 1e-15
+
+
 def test_walls_that_cannot_be_are_refused():
     with pytest.raises(ValueError, match="two equal points"):
         make_walls([[[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]])
