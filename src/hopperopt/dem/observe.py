@@ -7,7 +7,7 @@ from numba import njit
 
 from hopperopt.dem.contacts import deepest
 from hopperopt.dem.laws import elastic_energy
-from hopperopt.dem.state import COUNT, STEP
+from hopperopt.dem.state import COUNT, PARKED, STEP
 
 
 @njit(cache=True)
@@ -19,6 +19,8 @@ def motion_energies(spheres, counters, settings):
     kinetic = potential = 0.0
     half = 0.5 * settings.time_step
     for i in range(counters[COUNT]):
+        if spheres.position[i, 2] <= PARKED / 2.0:
+            continue  # it has left
         mass = spheres.mass[i]
         inertia = 0.4 * mass * spheres.radius[i] ** 2
         for a in range(3):
