@@ -256,7 +256,10 @@ def _about(long_name, units="1"):
 
 SCALARS = {
     "particle_count": _about("number of particles"),
-    "filling_level": _about("height of the settled bed's top above the outlet", "m"),
+    "filling_level": _about(
+        "height of the settled bed's top above the outlet: mean over ten rings of the highest resting sphere",
+        "m",
+    ),
     "settled": _about("whether the bed came to rest before the opening (1) or not (0)"),
     "filling_time": _about("simulated time of filling and settling", "s"),
     "discharge_time": _about("time from the opening to the last exit", "s"),

@@ -72,7 +72,8 @@ class FlowPattern:
 
     def __init__(self, case):
         self._coarse = case["particles"]["diameters"][-1]
-        self._insert = case["walls"]["insert"]
+        insert = case["walls"]["insert"]
+        self._insert = insert if insert and min(r for r, _ in insert) == 0.0 else None  # not a ring
         self._wall_radius = case["walls"]["hopper"][-1][0]
         self._sums, self._counts, self._samples = np.zeros(2), np.zeros(2), 0
 

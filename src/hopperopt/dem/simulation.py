@@ -138,11 +138,11 @@ class Simulation:
 
     def by_identity(self, values):
         """Rows of a spheres array put under the identities; NaN for what has left. (n,) or (n, 3)."""
-        left = np.isnan(self.exit_time)
+        inside = np.isnan(self.exit_time)
         ids = self.spheres.identity[: self.rows]
         out = np.full((len(self.exit_time), *values.shape[1:]), np.nan)
         out[ids] = values[: self.rows]
-        out[~left] = np.nan
+        out[~inside] = np.nan
         return out
 
     def touching(self):

@@ -28,12 +28,12 @@ class Spheres(NamedTuple):
 class Pairs(NamedTuple):
     """Half list of neighbours: row i holds `partner[start[i]:start[i + 1]]`, all of them > i."""
 
-    start: np.ndarray  # (n + 1,) int64
-    partner: np.ndarray  # (capacity,) int32
-    owner: np.ndarray  # (capacity,) int32, the row i of each entry
+    start: np.ndarray  # (n + 1,) uint32; unsigned rows need no check for negative ones in the inner loops
+    partner: np.ndarray  # (capacity,) uint32
+    owner: np.ndarray  # (capacity,) uint32, the row i of each entry
     touched: np.ndarray  # (capacity,) int64, the step in which the pair was last in contact
     spring: np.ndarray  # (capacity, 3) m, tangential spring of i against its partner, valid if it touched
-    contact: np.ndarray  # (capacity,) int32, scratch: the entries in contact in this step
+    contact: np.ndarray  # (capacity,) uint32, scratch: the entries in contact in this step
     carried: np.ndarray  # (capacity, 2) int64, identities of the contacts that a rebuild carries over
     carried_spring: np.ndarray  # (capacity, 3) m
 
