@@ -44,7 +44,7 @@ def draw(run: xr.Dataset) -> Figure:
         _half_way(run): PER_M * run["position_half"].values,
     }
     sensor = PER_M * case["discharge"]["sensor"]
-    limits = _limits(walls, PER_M * run["position_opening"].values, sensor)
+    limits = _limits(walls, PER_M * run["position_opening"].values, case)
     frame = style.Frame(left=11, right=1, bottom=19, top=5)
     gaps = (3.0, 6.0)
     scale = (WIDTH - frame.left - frame.right - gaps[0]) / 2 / (limits[1] - limits[0])
@@ -78,13 +78,19 @@ def _half_way(run):
     return f"at $M$ = 0.5, after {moment:.2f} s"
 
 
-def _limits(walls, position, sensor):
-    """Left, right, bottom and top (mm) of what is shown: particles, insert, and the way to the sensor."""
+def _limits(walls, position, case):
+    """Left, right, bottom and top (mm) of what is shown: particles, insert, and the way to the sensor.
+
+    A filling that blew up has left no positions: then it is the height that the bed should have had.
+    """
     widest = walls["hopper"][:, 0].max() + MARGIN
-    top = np.nanquantile(position[:, 2], 0.999)  # a few may still hop on the bed
+    heights = position[np.isfinite(position).all(axis=1), 2]
+    # A few may still hop on the bed, or fly away.
+    top = np.quantile(heights, 0.999) if len(heights) else PER_M * case["filling"]["level"]
+    top = min(top, walls["hopper"][:, 1].max())
     if "insert" in walls:
         top = max(top, walls["insert"][:, 1].max())
-    return -widest, widest, sensor - 2 * MARGIN, top + 3 * MARGIN
+    return -widest, widest, PER_M * case["discharge"]["sensor"] - 2 * MARGIN, top + 3 * MARGIN
 
 
 def _mirrored(profile):
@@ -116,8 +122,8 @@ def _draw_walls(axes: Axes, walls: Mapping) -> None:
 def _draw_particles(axes: Axes, run, position, side, limits, scale) -> None:
     order, sign, _ = SIDES[side]
     centre = position[:, order] * [1, 1, sign]
-    # NaN, a particle that has left, compares as false.
-    shown = centre[:, 2] >= 0
+    # A particle that has left, or that blew up, has no finite position.
+    shown = np.isfinite(centre).all(axis=1) & (centre[:, 2] >= 0)
     colours = np.array([to_rgb(COLOURS[name]) for name in outflow.SIZE_CLASSES])
     image = spheres.render(
         centre[shown],
