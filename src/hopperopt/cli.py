@@ -17,6 +17,7 @@ from hopperopt import provenance
 from hopperopt.document import ConfigError, lookup
 
 BAD_INPUT = 2
+MOST_SEED = 2**63 - 1
 SHORTHANDS = {"theta": "theta_deg", "length": "length_mm", "height": "height_mm"}
 
 
@@ -123,6 +124,14 @@ def _json(text: str) -> dict:
         raise argparse.ArgumentTypeError(f"no JSON: {error}") from None
 
 
+def _seed(text: str) -> int:
+    if not text.isdecimal() or int(text) > MOST_SEED:
+        raise argparse.ArgumentTypeError(
+            f"{text} is not allowed; allowed: a whole number from 0 to 2**63 - 1"
+        )
+    return int(text)
+
+
 def _run_stage(given: argparse.Namespace) -> None:
     """Call the stage's function with its parameters, inputs and outputs."""
     inputs = [getattr(given, option.rstrip("*")) for option in given.stage.inputs]
@@ -152,7 +161,7 @@ def _add_simulate(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--no-insert", action="store_true", help="the bare hopper")
     command.add_argument(
-        "--seed", type=int, metavar="N", help="seed of the filling (default: from the study's)"
+        "--seed", type=_seed, metavar="N", help="seed of the filling (default: from the study's)"
     )
     command.add_argument("--case", type=_json, metavar="JSON", help=argparse.SUPPRESS)
     command.add_argument("--design", nargs="*", default=[], metavar="YAML", help=argparse.SUPPRESS)
@@ -229,4 +238,7 @@ def _design(study, typed: dict[str, str]) -> dict[str, float]:
             design[name] = float(value)
         except ValueError:
             raise ConfigError(f"{name}: {value} is not allowed; allowed: a number") from None
+    for name, value in design.items():
+        if not isinstance(value, int | float):  # the key holds null or a word, as auto
+            raise ConfigError(f"{name} has no value: give --factor {name}=VALUE")
     return design

@@ -89,6 +89,31 @@ def test_bad_input_is_one_sentence_and_exit_status_2(tmp_path, monkeypatch, caps
     assert not (tmp_path / "run.nc").exists()
 
 
+@pytest.mark.parametrize("seed", ["-1", "1.5", "one", str(2**63)])
+def test_seed_that_is_not_allowed(tmp_path, capsys, seed):
+    with pytest.raises(SystemExit) as stopped:
+        cli.main(["simulate", "--seed", seed, "--output", str(tmp_path / "run.nc")])
+    assert stopped.value.code == 2
+    assert f"--seed: {seed} is not allowed; allowed: a whole number" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "levels"),
+    [
+        ("count", "filling.particles", [900, 1200, 1500, 1800, 2100]),
+        ("step_s", "simulation.time_step_s", [1e-5, 1.5e-5, 2e-5, 2.5e-5, 3e-5]),
+    ],
+)
+def test_a_factor_whose_key_holds_no_number_must_be_typed(simulated, tmp_path, capsys, name, key, levels):
+    simulation = "simulation: {time_step_s: auto}\nfilling: {particles: null}\n"
+    factor = f"factors: {{{name}: {{key: {key}, levels: {levels}}}}}\n"
+    (tmp_path / "config.yaml").write_text(simulation + factor)
+    assert cli.main(["simulate", "--output", "run.nc"]) == 2
+    assert f"{name} has no value: give --factor {name}=VALUE" in capsys.readouterr().err
+    case, _ = simulated("--factor", f"{name}={levels[0]}")
+    assert case["design"] == {name: levels[0]}
+
+
 def test_a_missing_input_and_bad_json_are_said_plainly(tmp_path, capsys):
     output = ["--output", str(tmp_path / "training.nc")]
     missing = ["--dataset", str(tmp_path / "dataset.nc"), *output]
