@@ -1,5 +1,7 @@
 """The plan's runs gathered in one dataset, and which runs may be data points at all."""
 
+import json
+import logging
 import os
 import re
 from collections.abc import Iterable, Mapping
@@ -13,6 +15,7 @@ from hopperopt import files, outflow
 
 # What a run that did not end well cannot tell; its counts and monitors stay, to show what went wrong.
 RESULTS = ("discharge_time", "discharge_rate", "mass_flow_index")
+NAMED = 30  # experiments in one sentence
 # Unit of a factor by the end of its name.
 UNITS = {"_deg": "degree", "_mm": "mm", "_kg_m3": "kg m-3", "_pa": "Pa", "_m_s": "m s-1", "_s": "s"}
 
@@ -27,6 +30,8 @@ def gather(
     that did not end well, unless they are to be dropped: then they are NaN in the dataset.
     """
     runs = read_runs(simulations)
+    if missed := missed_levels(runs):
+        logging.warning(missed)
     unusable = unusable_runs(runs)
     if unusable and params["incomplete"] != "drop":
         raise files.InputError(refusal(unusable))
@@ -50,6 +55,26 @@ def read_runs(paths: Iterable) -> dict[tuple[str, int], xr.Dataset]:
 def unusable_runs(runs: Mapping[tuple[str, int], xr.Dataset]) -> dict[tuple[str, int], str]:
     """Reason, in words, for each run that is no data point: everything but status `complete`."""
     return {key: outcome(run) for key, run in runs.items() if run["status"].item() != "complete"}
+
+
+def missed_levels(runs: Mapping[tuple[str, int], xr.Dataset]) -> str | None:
+    """Sentence naming experiments whose bed missed its level by more than a coarse diameter, or None."""
+    missed = {}
+    for key, run in runs.items():
+        if "case" not in run.attrs:
+            continue
+        case = json.loads(run.attrs["case"])
+        miss = float(run["filling_level"]) - case["filling"]["level"]
+        if abs(miss) > max(case["particles"]["diameters"]):
+            missed[key] = 1e3 * miss
+    if not missed:
+        return None
+    named = list(dict.fromkeys(name for name, _ in missed))
+    others = f" and {len(named) - NAMED} more" if len(named) > NAMED else ""
+    return (
+        f"the bed missed its level by {min(missed.values()):+.1f} to {max(missed.values()):+.1f} mm "
+        f"in {', '.join(named[:NAMED])}{others} (more than a coarse particle)"
+    )
 
 
 def outcome(run: xr.Dataset) -> str:

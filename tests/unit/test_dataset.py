@@ -1,5 +1,7 @@
 """The data set holds every run at its place, and no run that did not end well."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -91,6 +93,19 @@ def test_a_residual_within_the_limit_is_a_data_point(study, make_run):
     data = gather(study)
     assert data["residual_count"].sel(experiment="exp_01", replicate=1) == 2
     assert data["mass_fraction"].notnull().all()
+
+
+def test_beds_that_miss_their_level_are_named_in_one_warning(study, make_run, caplog):
+    case = {"filling": {"level": 0.074}, "particles": {"diameters": [0.002, 0.003, 0.004]}}
+    for name, level in (("exp_01", 0.0695), ("exp_02", 0.0701), ("exp_100", 0.080)):
+        run = make_run(filling_level=level).assign_attrs(case=json.dumps(case))
+        files.write_netcdf(run, study / f"{name}_rep_1.nc")
+    gather(study)
+    (record,) = caplog.records
+    said = record.getMessage()
+    assert (
+        "by -4.5 to +6.0 mm in " in said and "exp_01" in said and "exp_100" in said and "exp_02" not in said
+    )
 
 
 def test_batches_of_other_composition_are_refused(study, make_run):
