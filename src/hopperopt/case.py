@@ -5,7 +5,8 @@ import math
 from hopperopt import geometry
 
 MM = 1000.0
-HEADROOM = 0.020  # m of wall above the column of falling particles
+HEADROOM = 0.020  # m of wall above all that a particle can reach
+SCATTERS = 5  # standard deviations of the speed that the fastest particle has upwards
 
 
 def simulation(setup, labels, seed):
@@ -13,7 +14,7 @@ def simulation(setup, labels, seed):
     insert, spheres = setup.insert_profile, setup.particles
     return {
         "walls": {
-            "hopper": setup.hopper.profile(_column_top(setup) + HEADROOM).tolist(),
+            "hopper": setup.hopper.profile(_wall_top(setup)).tolist(),
             "gate": geometry.gate(setup.hopper.outlet_radius_mm / MM).tolist(),
             "insert": None if insert is None else insert.tolist(),
         },
@@ -66,3 +67,10 @@ def _column_top(setup):
     section = math.pi * _column_radius(setup) ** 2
     volume = setup.particle_count * sphere / setup.filling.column_solid_fraction
     return setup.column_bottom + volume / section
+
+
+def _wall_top(setup):
+    """Height of the wall: clear of the column's spheres and the rise of those that start upwards."""
+    upwards = SCATTERS * setup.filling.speed_scatter_m_s
+    rise = upwards * upwards / (2 * setup.simulation.gravity_m_s2)
+    return _column_top(setup) + setup.particles.diameters[-1] + rise + HEADROOM

@@ -17,10 +17,12 @@ SIMULATED = {"hopper", "insert", "particles", "wall", "contact", "filling", "dis
 SMALLEST_GAP, USUAL_GAP = 2, 3  # coarse diameters between insert and wall
 USUAL_OUTLET = 5  # coarse diameters
 MOST_PARTICLES = 10_000_000
-USUAL_STEP = 0.4  # Rayleigh times
-# Materials up to these take the longer step: see the specification of the contact law.
+SHORTEST_STEP, USUAL_STEP = 1e-4, 0.4  # Rayleigh times
+# The scheme is stable at the paper's step for the paper's materials: those with at most its restitution and
+# friction may take it without a warning.
 TESTED = {"step": 0.78, "restitution": 0.7, "static_friction": 0.5}
 MOST_CORNERS = 256
+FOLDS = 5  # of the cross-validation
 
 
 class Finding(NamedTuple):
@@ -80,6 +82,9 @@ def _time_step(setup):
     if setup.time_step > rayleigh:
         allowed = f"at most {rayleigh:.3g} (the smallest sphere's Rayleigh time, s), or auto (a fifth of it)"
         yield _no("simulation.time_step_s", "step", setup.time_step, f"{setup.time_step:g}", allowed)
+    elif setup.time_step < SHORTEST_STEP * rayleigh:
+        allowed = f"at least {SHORTEST_STEP * rayleigh:.3g} ({SHORTEST_STEP:g} Rayleigh times, s)"
+        yield _no("simulation.time_step_s", "short", -setup.time_step, f"{setup.time_step:g}", allowed)
 
 
 def _insert(setup):
@@ -200,6 +205,9 @@ def _factor_keys(study):
             near = difflib.get_close_matches(factor.key, known, n=1)
             hint = f"; did you mean {near[0]}?" if near else ""
             yield mistake(f"{place}.key", factor.key, f"the key of a number that the simulations use{hint}")
+        elif factor.key.startswith("particles.diameters_mm."):
+            allowed = "a number other than the diameters: all experiments share one batch (its composition)"
+            yield mistake(f"{place}.key", factor.key, allowed)
         elif factor.key in setters:
             yield mistake(f"{place}.key", factor.key, f"a key that {setters[factor.key]} does not set")
         else:
@@ -249,6 +257,29 @@ def _network(study):
     if count - held_out < 2:
         allowed = f"at most {count - 2} experiments for validation and test together, of {count}"
         yield mistake("surrogate.validation_experiments", surrogate.validation_experiments, allowed)
+    elif surrogate.split == "experiments":
+        yield from _split(study, count, held_out)
+
+
+def _split(study, count, held_out):
+    """Enough whole experiments to train on, and for the cross-validation."""
+    surrogate = study.surrogate
+    if surrogate.selected_hidden_nodes == "auto" and count - surrogate.test_experiments < FOLDS:
+        allowed = f"auto only with {FOLDS} experiments or more that are not the test's"
+        yield mistake("surrogate.selected_hidden_nodes", "auto", allowed)
+    # Two experiments for each factor can always hold its extremes, whichever the draw takes away.
+    if count - held_out < 2 * len(study.factors):
+        # Slow to import, and rarely needed.
+        from hopperopt.files import InputError
+        from hopperopt.surrogate import split
+
+        designs = [[design[name] for name in study.factors] for _, design in study.experiments()]
+        try:
+            split.split_experiments(
+                designs, surrogate.validation_experiments, surrogate.test_experiments, surrogate.seed
+            )
+        except InputError as error:
+            yield f"surrogate.validation_experiments: {error}"
 
 
 def _explicit(study):
@@ -322,4 +353,19 @@ def warnings(study):
     corners = plans.corners(study.levels) if 2 ** len(study.factors) <= MOST_CORNERS else []
     extremes = [("a corner", corner, study.with_design(corner)) for corner in corners]
     refused = _grouped(extremes, _refused)
+    found += _narrow_plan(study)
     return found + [f"the optimiser may propose designs that are refused: {sentence}" for sentence in refused]
+
+
+def _narrow_plan(study):
+    """Factors whose levels reach beyond an own plan: there the optimiser would trust an extrapolation."""
+    if study.design.plan != "csv":
+        return
+    for name, levels in study.levels.items():
+        values = [design[name] for _, design in study.experiments()]
+        (least, most), (low, high) = (min(values), max(values)), plans.bounds(levels)
+        if least > low or most < high:
+            yield (
+                f"factors.{name}.levels: the optimiser searches {low:g} to {high:g}, but the experiments "
+                f"of the plan hold only {least:g} to {most:g}"
+            )

@@ -44,6 +44,7 @@ __all__ = ["ConfigError", "Setup", "Study", "derived_case", "load", "parse"]
 MM = 1000.0  # millimetres in a metre; dividing by it rounds once, so that 22.5 mm is 0.0225 m
 CLEARANCE = 0.005  # m between what is below and the column of falling particles
 RAYLEIGH_SHARE = 0.2  # of `time_step_s: auto`
+MOST_EXPERIMENTS = 1000  # a stage gets the plan in one argument, whose length the system limits
 
 
 class Number(Quantity):
@@ -60,7 +61,7 @@ class Number(Quantity):
         return core_schema.no_info_before_validator_function(read, handler(source))
 
 
-Positive = Annotated[float, Number(above=0)]
+Seconds = Annotated[float, Number(above=0, most=10_000)]
 Length = Annotated[float, Number(above=0, most=100_000)]
 Coordinate = Annotated[float, Number(least=-100_000, most=100_000)]
 Density = Annotated[float, Number(above=0, most=100_000)]
@@ -68,8 +69,9 @@ Speed = Annotated[float, Number(least=0, most=100)]
 Friction = Annotated[float, Number(least=0, most=10)]
 Share = Annotated[float, Number(least=0, most=1)]
 Finite = Annotated[float, Number()]
-Count = Annotated[int, Number(least=1)]
-Seed = Annotated[int, Number(least=0)]
+Count = Annotated[int, Number(least=1, most=10_000)]
+Nodes = Annotated[int, Number(least=1, most=200)]
+Seed = Annotated[int, Number(least=0, most=2**63 - 1)]
 Poisson = Annotated[float, Number(least=0, most=0.5)]
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$")]
 
@@ -212,15 +214,15 @@ class Filling(Model):
     column_solid_fraction: Annotated[float, Number(above=0, most=0.3)] = 0.2
     speed_m_s: Speed = 0.5
     speed_scatter_m_s: Speed = 0.05
-    settling_limit_s: Positive = 1.5
+    settling_limit_s: Seconds = 1.5
 
 
 class Discharge(Model):
     """How the discharge is measured, and what becomes of one that does not end."""
 
     sensor_mm: Annotated[float, Number(least=-100_000, below=0)] = -12.0
-    idle_limit_s: Positive = 0.5
-    time_limit_s: Positive = 10.0
+    idle_limit_s: Seconds = 0.5
+    time_limit_s: Seconds = 10.0
     incomplete: Literal["refuse", "drop"] = "refuse"
 
 
@@ -310,14 +312,14 @@ def _power_of_two(count):
 class Hypercube(Model):
     """Latin hypercube within the ranges of the levels."""
 
-    experiments: Annotated[int, Number(least=2, most=10_000)] = 25
+    experiments: Annotated[int, Number(least=2, most=MOST_EXPERIMENTS)] = 25
     seed: Seed = 1
 
 
 class Sobol(Model):
     """Sobol' points within the ranges of the levels."""
 
-    experiments: Annotated[int, Number(least=2, most=10_000), AfterValidator(_power_of_two)] = 32
+    experiments: Annotated[int, Number(least=2, most=MOST_EXPERIMENTS), AfterValidator(_power_of_two)] = 32
     seed: Seed = 1
 
 
@@ -341,9 +343,9 @@ class Surrogate(Model):
     """The network: filter, split, hidden sizes and starts."""
 
     clip_sigma: Annotated[float | None, Number(above=0)] = 3.0
-    hidden_nodes: Annotated[tuple[Count, ...], Field(min_length=1)] = (3, 4, 5, 6, 7, 8, 9, 10)
+    hidden_nodes: Annotated[tuple[Nodes, ...], Field(min_length=1)] = (3, 4, 5, 6, 7, 8, 9, 10)
     starts: Count = 100
-    selected_hidden_nodes: Annotated[int | Literal["auto"], Number(least=1)] = 7
+    selected_hidden_nodes: Annotated[int | Literal["auto"], Number(least=1, most=200)] = 7
     split: Literal["experiments", "points"] = "experiments"
     validation_experiments: Count = 4
     test_experiments: Count = 4
@@ -353,7 +355,7 @@ class Surrogate(Model):
 class Optimise(Model):
     """NSGA-II and the choice from its front."""
 
-    population: Annotated[int, Number(least=4)] = 100
+    population: Annotated[int, Number(least=4, most=10_000)] = 100
     generations: Count = 30
     crossover_probability: Share = 0.9
     mutation_probability: Share = 0.1

@@ -19,6 +19,7 @@ RESERVED = {
     "counting_variance", "particle_count", "filling_level", "filling_time", "settled", "discharge_time",
     "discharge_time_s", "discharge_rate", "mass_flow_index", "max_overlap", "max_speed_ratio",
     "max_energy_gain", "lost_particles", "residual_count", "residual_mass_fraction", "step_count",
+    "filling_level_mm", "moved", "clip_low", "clip_high", "target_clipped",
 }
 # fmt: on
 

@@ -104,7 +104,12 @@ def test_unknown_key_is_named_with_its_value_and_the_nearest(key, value, said):
         ("filling.level_mm", -1, "a number above 0"),
         ("surrogate.starts", 0, "a whole number at least 1"),
         ("surrogate.starts", "many", "a whole number at least 1"),
-        ("surrogate.selected_hidden_nodes", "best", "a whole number at least 1 or auto"),
+        ("surrogate.selected_hidden_nodes", "best", "a whole number at least 1 and at most 200 or auto"),
+        ("surrogate.starts", 10**9, "at most 10000"),
+        ("seed", 2**64, "at most 9.22337e+18"),
+        ("discharge.time_limit_s", 1e6, "at most 10000"),
+        ("design.lhs.experiments", 1001, "at most 1000"),
+        ("simulation.time_step_s", 1e-12, "at least 5.18e-09"),
         ("surrogate.hidden_nodes", [], "at least 1 entries"),
         ("surrogate.hidden_nodes", 7, "a list"),
         ("design.sobol.experiments", 25, "a power of two"),
@@ -346,6 +351,33 @@ def test_own_plan_is_checked_like_any_other(tmp_path):
             "cone, profile or none",
         ),
         ({"insert": {"shape": "none"}}, "factors.theta_deg.key", "makes none"),
+        (
+            {"factors": {"theta_deg": {"key": "particles.diameters_mm.2"}}},
+            "factors.theta_deg.key",
+            "other than the diameters",
+        ),
+        (
+            {"factors": {"moved": {"key": "wall.poisson_ratio", "levels": [0.2, 0.3]}}},
+            "factors.moved",
+            "a name",
+        ),
+        (
+            {"design": {"plan": "lhs", "lhs": {"experiments": 10}}},
+            "surrogate.validation_experiments",
+            "10 experiments are too few",
+        ),
+        (
+            {
+                "design": {"plan": "lhs", "lhs": {"experiments": 8}},
+                "surrogate": {
+                    "selected_hidden_nodes": "auto",
+                    "validation_experiments": 1,
+                    "test_experiments": 4,
+                },
+            },
+            "surrogate.selected_hidden_nodes",
+            "5 experiments or more",
+        ),
         ({"surrogate": {"selected_hidden_nodes": 11}}, "surrogate.selected_hidden_nodes", "auto or one of 3"),
         ({"surrogate": {"hidden_nodes": [7, 7]}}, "surrogate.hidden_nodes", "differ"),
         ({"surrogate": {"test_experiments": 21}}, "surrogate.validation_experiments", "at most 23"),
@@ -373,6 +405,20 @@ def test_parts_that_do_not_go_together(changes, key, said):
     assert lines[0].startswith(f"{key}: ") and said in lines[0]
 
 
+def test_small_plan_that_can_be_split_is_accepted(tmp_path):
+    corners = "experiment,length_mm,height_mm\na,30,15\nb,50,34\nc,30,34\nd,40,20\ne,45,30\n"
+    changes = {**plan_file(tmp_path, corners), "factors": TWO_FACTORS}
+    changes["surrogate"] |= {"test_experiments": 2, "hidden_nodes": [7]}
+    assert len(config.parse(changes, tmp_path).plan) == 5
+
+
+def test_own_plan_narrower_than_its_levels_is_a_warning(tmp_path):
+    narrow = "experiment,length_mm,height_mm\na,32,15\nb,50,34\nc,32,34\nd,40,20\ne,45,15\n"
+    study = config.parse({**plan_file(tmp_path, narrow), "factors": TWO_FACTORS}, tmp_path)
+    (line,) = [line for line in study.warnings() if "of the plan" in line]
+    assert line.startswith("factors.length_mm.levels: ") and "30 to 50" in line and "32 to 50" in line
+
+
 def test_null_leaves_out_a_factor_and_a_case():
     study = config.parse(
         with_paper({"factors": {"theta_deg": None}, "verification": {"cases": {"bare": None}}})
@@ -394,15 +440,15 @@ def test_cases():
 
 def test_any_number_can_be_a_factor():
     factors = {
-        "coarse_mm": {"key": "particles.diameters_mm.2", "levels": [3.5, 4]},
+        "density_kg_m3": {"key": "particles.density_kg_m3", "levels": [2000, 2500]},
         "friction": {"key": "contact.wall.static_friction", "levels": [0.3, 0.5]},
     }
     design = {"plan": "lhs", "lhs": {"experiments": 12}}
     study = config.parse({"factors": factors, "design": design})
-    case = study.simulation_case({"coarse_mm": 3.6, "friction": 0.4}, "exp_01", 1)
-    assert case["particles"]["diameters"][2] == 0.0036
+    case = study.simulation_case({"density_kg_m3": 2100, "friction": 0.4}, "exp_01", 1)
+    assert case["particles"]["density"] == 2100
     assert case["contact"]["wall"]["static_friction"] == 0.4
-    assert case["design"] == {"coarse_mm": 3.6, "friction": 0.4}
+    assert case["design"] == {"density_kg_m3": 2100, "friction": 0.4}
 
 
 def test_case_of_the_centre():
@@ -415,7 +461,8 @@ def test_case_of_the_centre():
     fine, _, coarse = case["particles"]["diameters"]
     column = count / 3 * 3.141592653589793 / 6 * (fine**3 + 0.003**3 + coarse**3) / 0.2
     assert top[0] == 0.05
-    assert top[1] == pytest.approx(0.079 + column / (3.141592653589793 * 0.048**2) + 0.02)
+    rise = 0.25**2 / (2 * 9.81)  # of a particle that starts upwards at five standard deviations
+    assert top[1] == pytest.approx(0.079 + column / (3.141592653589793 * 0.048**2) + 0.004 + rise + 0.02)
     assert json.loads(json.dumps(case)) == case
 
 
