@@ -10,10 +10,11 @@ import pytest
 import xarray as xr
 
 from hopperopt import files
-from hopperopt.outflow import GRID, objective
+from hopperopt.outflow import GRID, objective, signed_root
 from hopperopt.surrogate import prediction, split, targets, training
 
 BATCH = np.array([8, 27, 64]) / 99
+NOISE = np.array([0.0065, 0.0177, 0.0189])
 FACTORS = {"theta_deg": [50, 60], "length_mm": [30, 50]}
 FILTER = {
     "factors": FACTORS,
@@ -43,12 +44,18 @@ def noiseless(designs):
 def dataset(replicates=1, noise=1.0):
     rng = np.random.default_rng(0)
     curves = np.repeat(noiseless(plan())[:, None], replicates, axis=1)
-    curves[:, :, 0] += noise * rng.normal(0, 0.0065, curves[:, :, 0].shape)
-    curves[:, :, 1] += noise * rng.normal(0, 0.0177, curves[:, :, 1].shape)
+    curves[:, :, 0] += noise * rng.normal(0, NOISE[0], curves[:, :, 0].shape)
+    curves[:, :, 1] += noise * rng.normal(0, NOISE[1], curves[:, :, 1].shape)
     curves[:, :, 2] = 1 - curves[:, :, :2].sum(axis=2)
     levels = {name: np.mean(r) + plan()[:, k] * np.ptp(r) / 2 for k, (name, r) in enumerate(FACTORS.items())}
     return xr.Dataset(
-        {"mass_fraction": (("experiment", "replicate", "size_class", "M"), curves)},
+        {
+            "mass_fraction": (("experiment", "replicate", "size_class", "M"), curves),
+            "counting_variance": (
+                ("experiment", "replicate", "size_class", "M"),
+                np.broadcast_to((noise * NOISE[:, None]) ** 2, curves.shape).copy(),
+            ),
+        },
         coords={
             "experiment": [f"exp_{n:02d}" for n in range(1, 26)],
             "replicate": np.arange(1, replicates + 1),
@@ -129,6 +136,35 @@ def test_experiment_without_a_complete_run_is_left_out(filtered):
     assert not any(result[name].isnull().any() for name in ("target", "target_clipped", "J"))
 
 
+@pytest.mark.parametrize("by", ["experiments", "points"])
+def test_no_complete_run_at_all_is_refused_in_a_sentence(filtered, by):
+    with pytest.raises(files.InputError, match="no experiment has a complete run"):
+        filtered(dataset() * np.nan, split=by)
+
+
+@pytest.mark.parametrize("by", ["experiments", "points"])
+def test_too_few_experiments_left_are_refused(filtered, by):
+    data = dataset()
+    data["mass_fraction"][8:] = np.nan
+    with pytest.raises(files.InputError, match="8 experiments are too few"):
+        filtered(data, split=by)
+
+
+def test_corrected_square_has_lost_the_noise_of_the_mean(filtered):
+    """U scatters around J^2 of the curves without noise, whatever the number of runs."""
+    data = dataset(replicates=3)
+    data["mass_fraction"][::2, 1] = np.nan  # these have two runs left
+    data["counting_variance"][::2, 1] = np.nan
+    result = filtered(data)
+    noiseless_square = objective(noiseless(plan())[:, :2], BATCH[:2]) ** 2
+    bias = result["U"].values - noiseless_square
+    for some in (bias[::2], bias[1::2]):
+        standard_error = some.std(axis=0, ddof=1) / np.sqrt(len(some))
+        assert (np.abs(some.mean(axis=0)) < 3 * standard_error).all()
+        # Without the correction it would be off by the variance of the mean.
+        assert (NOISE[:2] ** 2 / 3 > 2 * standard_error)[1]
+
+
 def test_clip_moves_the_training_targets_to_three_sigma_and_nothing_else(filtered):
     result = filtered(dataset())
     held_out = result.isel(experiment=result["split"].values != "training")
@@ -197,6 +233,24 @@ def test_network_file_gives_back_the_predictor_and_its_origin(trained):
     np.testing.assert_allclose(predictor.objectives(row), objective(curve, BATCH[:2]))
     with pytest.raises(files.InputError, match="theta_deg, length_mm"):
         predictor.array({"theta_deg": 55.0})
+
+
+@pytest.mark.parametrize(("by", "judging"), [("experiments", 4), ("points", 25)])
+def test_uncertainty_of_the_objectives_is_that_of_the_experiments_that_stop_the_training(
+    trained, tmp_path, by, judging
+):
+    path, _ = trained(dataset(replicates=2), {"split": by})
+    predictor, data = prediction.load(path), files.read_netcdf(tmp_path / "training.nc")
+    if by == "experiments":
+        data = used_as(data, "validation")
+    assert data.sizes["experiment"] == judging
+    for k, output in enumerate(("fine", "intermediate")):
+        errors = [
+            predictor.objectives(np.array([[one["theta_deg"], one["length_mm"]]]))[0, k]
+            - signed_root(one["U"].sel(output=output).item())
+            for one in (data.isel(experiment=n) for n in range(judging))
+        ]
+        assert predictor.objective_error[k] == pytest.approx(np.sqrt(np.mean(np.square(errors))))
 
 
 def test_errors_are_those_of_the_stored_network_against_unclipped_targets(trained, tmp_path):

@@ -20,6 +20,7 @@ class Predictor(NamedTuple):
     M: np.ndarray  # (m,) discharged mass fractions at which curves are predicted
     batch: np.ndarray  # (outputs,) mass fractions in the batch, m_k0
     network: Network
+    objective_error: np.ndarray | None = None  # (outputs,) rms error of J, see `training`
 
     def curves(self, designs: np.ndarray) -> np.ndarray:
         """Mass fractions m_k(M), (n, outputs, m), of designs (n, factors) in the factors' order and units."""
@@ -39,6 +40,10 @@ class Predictor(NamedTuple):
 def save(path: str | os.PathLike, predictor: Predictor, additions: Mapping, attributes: Mapping) -> None:
     """Write network.nc: the predictor, further variables (the clip's limits, the split) and attributes."""
     network = predictor.network
+    if predictor.objective_error is not None:
+        text = "rms departure of the predicted J from the simulated, noise-corrected one"
+        described = {"long_name": text, "units": "1"}
+        additions = {**additions, "objective_error": ("output", predictor.objective_error, described)}
     result = xr.Dataset(
         {
             "hidden_weights": (
@@ -96,4 +101,5 @@ def load(path: str | os.PathLike) -> Predictor:
         Scaling(data["output_centre"].values, data["output_scale"].values),
     )
     factors = tuple(str(name) for name in data["input"].values[:-1])
-    return Predictor(factors, data["M"].values, data["target_fraction"].values, network)
+    error = data["objective_error"].values if "objective_error" in data else None
+    return Predictor(factors, data["M"].values, data["target_fraction"].values, network, error)

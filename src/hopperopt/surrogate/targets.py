@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from hopperopt.files import InputError, read_netcdf, write_netcdf
-from hopperopt.outflow import objective
+from hopperopt.outflow import corrected_square, objective
 from hopperopt.surrogate.features import OUTPUTS
 from hopperopt.surrogate.split import TRAINING, split_experiments, split_points
 
@@ -18,7 +18,8 @@ def filter_targets(params: Mapping, dataset: str | os.PathLike, output: str | os
     params: `factors` (names as keys), `clip_sigma` (None: no clip), `split` ("experiments" or "points"),
     `validation_experiments` and `test_experiments` (numbers of them), `seed`.
     dataset: path of the data set; output: path of training.nc.
-    Experiments without a complete run are left out, and named in the attribute `left_out`.
+    Experiments without a complete run are left out, and named in the attribute `left_out`. Raises
+    files.InputError if none has one, or too few for the split.
 
     The clip (the paper's filter) cuts each output to its mean +- clip_sigma standard deviations over all
     training points. It moves training targets only: validation and test targets stay as simulated, and so do
@@ -28,6 +29,8 @@ def filter_targets(params: Mapping, dataset: str | os.PathLike, output: str | os
     factors = list(params["factors"])
     simulated = data["mass_fraction"].notnull().all(("size_class", "M")).any("replicate")
     left_out = [str(name) for name in data["experiment"].values[~simulated.values]]
+    if not simulated.any():
+        raise InputError("no experiment has a complete run: there is nothing to train a surrogate with")
     data = data.isel(experiment=simulated.values)
     targets = (
         data["mass_fraction"].sel(size_class=list(OUTPUTS)).mean("replicate").rename(size_class="output")
@@ -47,7 +50,9 @@ def filter_targets(params: Mapping, dataset: str | os.PathLike, output: str | os
         "clip_sigma": np.inf if params["clip_sigma"] is None else params["clip_sigma"],
         "left_out": " ".join(left_out),
     }
-    write_netcdf(_with_objectives(result, within), output)
+    result = _with_objectives(result, within)
+    result["U"] = _corrected_squares(data, result)
+    write_netcdf(result, output)
 
 
 def clip_limits(
@@ -96,6 +101,10 @@ def _labels(params, data, factors):
     if params["split"] == "points":
         # The shares that these experiments are of the plan.
         shape = data.sizes["experiment"], data.sizes["M"]
+        if sum(held_out) >= shape[0]:
+            raise InputError(
+                f"{shape[0]} experiments are too few: validation and test take the points of {sum(held_out)}"
+            )
         return split_points(shape, *(count / shape[0] for count in held_out), params["seed"])
     raise InputError(f"split: {params['split']!r} is not allowed; allowed: experiments, points")
 
@@ -126,6 +135,16 @@ def _with_objectives(result, within):
             _described(f"largest less smallest {name}"),
         )
     return result
+
+
+def _corrected_squares(data, result):
+    """U of each experiment's mean curve; the mean of n runs has the mean of their variances over n."""
+    runs = data["mass_fraction"].notnull().all(("size_class", "M")).sum("replicate")
+    variance = data["counting_variance"].mean("replicate") / runs
+    variance = variance.sel(size_class=list(OUTPUTS)).transpose("experiment", "size_class", "M")
+    values = corrected_square(result["target"].values, result["target_fraction"].values, variance.values)
+    text = "objective squared of the mean curve, less its counting variance; may be negative"
+    return ("experiment", "output"), values, _described(text)
 
 
 def _described(text):

@@ -11,6 +11,7 @@ import pandas as pd
 import xarray as xr
 
 from hopperopt.files import InputError, read_netcdf, write_table
+from hopperopt.outflow import signed_root
 from hopperopt.surrogate import features, prediction
 from hopperopt.surrogate.estimator import NetworkRegressor
 from hopperopt.surrogate.split import TEST, TRAINING, VALIDATION, folds
@@ -130,6 +131,20 @@ def _error_table(points, regressors, scores, choice):
     return pd.DataFrame(table)
 
 
+def _objective_error(data, predictor):
+    """How far predicted objectives are off: rms of J less sign(U) sqrt|U|, (outputs,).
+
+    Over the experiments that stopped the training, since the test chooses nothing; with the points split
+    every experiment has trained in part, and all count. The counting noise of U itself is part of it.
+    """
+    designs = np.column_stack([data[name].values for name in predictor.factors])
+    simulated = signed_root(data["U"].transpose("experiment", "output").values)
+    difference = predictor.objectives(designs) - simulated
+    use = data["split"].values
+    judging = use == VALIDATION if use.ndim == 1 else np.full(len(use), True)
+    return np.sqrt(np.mean(difference[judging] ** 2, axis=0))
+
+
 def _save(path, data, regressor, params):
     """Write the selected network with everything that says where it comes from."""
     predictor = prediction.Predictor(
@@ -138,6 +153,7 @@ def _save(path, data, regressor, params):
         data["target_fraction"].values,
         regressor.network_,
     )
+    predictor = predictor._replace(objective_error=_objective_error(data, predictor))
     additions = {name: data[name] for name in ("clip_low", "clip_high", "split")}
     attributes = {
         "title": "surrogate of the outflow: feed-forward network, logistic hidden nodes, linear outputs",
