@@ -23,6 +23,7 @@ from hopperopt.surrogate.features import OUTPUTS, factor_grid, violation
 
 OBJECTIVES = tuple(f"J_{name}" for name in OUTPUTS)
 GRID_DESIGNS = 10_000  # size of the grid on which impossible predictions are counted, about
+NEAR_BOUND = 0.01  # of a factor's range
 
 log = logging.getLogger(__name__)
 
@@ -52,7 +53,7 @@ def optimise(
     predictor = prediction.load(network)
     bounds = np.array([params["bounds"][name] for name in predictor.factors], dtype=float)
     found, record = search(predictor, bounds, params)
-    choice = _choose(params, predictor, found)
+    choice = _choose(params, predictor, bounds, found)
     impossible = count_impossible(predictor, bounds)
     table = pd.DataFrame(
         np.hstack([found.designs, found.objectives]), columns=[*predictor.factors, *OBJECTIVES]
@@ -134,19 +135,21 @@ class _Record(Callback):
         self.generations.append([algorithm.pop.get(name) for name in ("X", "F", "G")])
 
 
-def _choose(params, predictor, found):
+def _choose(params, predictor, bounds, found):
     """Choose a design: the head of selected.yaml, and its `index` in the front (-1: not of the front)."""
     centre = predictor.objectives(predictor.array(params["centre"]))[0]
-    warning = None
+    warnings = []
     if params["select"] == "explicit":
         index, rule, design = -1, "explicit", predictor.array(params["explicit"])
     else:
-        index, rule, warning = select(params["select"], found.objectives, centre)
+        index, rule, warning = select(params["select"], found.objectives, centre, predictor.objective_error)
         design = found.designs[[index]]
+        warnings += [] if warning is None else [warning]
+        warnings += _on_bounds(predictor.factors, design[0], bounds)
     feasible = violation(predictor.curves(design))[0] <= 0
     if not feasible:
-        impossible = "the surrogate predicts impossible mass fractions for the selected design"
-        warning = impossible if warning is None else f"{warning}; {impossible}"
+        warnings.append("the surrogate predicts impossible mass fractions for the selected design")
+    warning = "; ".join(warnings) or None
     if warning is not None:
         log.warning(warning)
     return {
@@ -158,6 +161,16 @@ def _choose(params, predictor, found):
         "predicted_centre": dict(zip(OBJECTIVES, centre, strict=True)),
         "index": index,
     }
+
+
+def _on_bounds(factors, design, bounds):
+    """A sentence for every factor of a design (factors,) that the search's bounds (factors, 2) hold back."""
+    return [
+        f"{name} = {value:.5g} lies on the bound {bound:g} of its range: the optimum may lie beyond"
+        for name, value, limits in zip(factors, design, bounds, strict=True)
+        for bound in limits
+        if abs(value - bound) <= NEAR_BOUND * np.ptp(limits)
+    ]
 
 
 def _history(record, factors):

@@ -109,7 +109,7 @@ def test_outputs_agree_with_each_other_and_with_the_network(run):
     assert table["feasible"].all()
     assert table["J_fine"].is_monotonic_increasing and table["J_intermediate"].is_monotonic_decreasing
 
-    assert selected["rule"] == "knee" and selected["warning"] is None and selected["feasible"]
+    assert selected["rule"] == "knee" and selected["feasible"]
     chosen = table[table["selected"]]
     assert len(chosen) == 1
     np.testing.assert_allclose(chosen[list(RANGES)].iloc[0], list(selected["design"].values()), rtol=1e-8)
@@ -152,6 +152,31 @@ def test_explicit_design_is_taken_as_it_is(run):
     assert not table["selected"].any()
     model = predictor()
     assert list(selected["predicted"].values()) == model.objectives(model.array(design))[0].tolist()
+
+
+def test_front_shorter_than_the_networks_uncertainty_gives_the_compromise(run, caplog):
+    usual = run()[2]
+    assert usual["rule"] == "knee"
+    selected = run(model=predictor()._replace(objective_error=np.array([1.0, 1.0])))[2]
+    assert selected["rule"] == "compromise"
+    assert "shorter than the predictions' uncertainty" in selected["warning"]
+    assert selected["warning"] in caplog.text
+    assert run(model=predictor()._replace(objective_error=np.array([1e-6, 1e-6])))[2] == usual
+
+
+def test_optimum_on_a_bound_is_warned_of_until_the_range_reaches_beyond(run, caplog):
+    shut_in = run()[2]
+    value = shut_in["design"]["theta_deg"]
+    expected = f"theta_deg = {value:.5g} lies on the bound 50 of its range: the optimum may lie beyond"
+    assert shut_in["warning"] == expected
+    assert expected in caplog.text
+
+    wider = run(bounds=RANGES | {"theta_deg": [40, 60]})[2]
+    assert 41 < wider["design"]["theta_deg"] < 49
+    assert "theta_deg" not in (wider["warning"] or "")
+
+    both = run(model=predictor()._replace(objective_error=np.array([1.0, 1.0])))[2]["warning"].split("; ")
+    assert [part.split(" ", 1)[0] for part in both] == ["no", "theta_deg"]
 
 
 def test_nothing_possible_gives_the_least_impossible_and_says_so(run, caplog):

@@ -56,6 +56,21 @@ def test_points_beyond_the_chord_are_no_knee():
     assert knee(front) == (1, None)
 
 
+def test_front_shorter_than_the_uncertainty_has_no_knee():
+    front = bent_front() * [0.003, 0.004] + [0.010, 0.012]
+    index, rule, warning = select("knee", front, [1.0, 2.0], np.array([0.0035, 0.0045]))
+    assert (index, rule) == (compromise(front, [1.0, 2.0]), "compromise")
+    assert "the front is shorter than the predictions' uncertainty (J_f spans 0.003" in warning
+    assert "0.0045" in warning
+
+
+@pytest.mark.parametrize("error", [None, [0.0035, 0.0035], [0.0025, 0.0045], [np.nan, np.nan]])
+def test_front_longer_than_the_uncertainty_in_one_objective_keeps_its_knee(error):
+    front = bent_front() * [0.003, 0.004] + [0.010, 0.012]
+    error = None if error is None else np.array(error)
+    assert select("knee", front, CENTRE, error) == (4, "knee", None)
+
+
 def test_unknown_rule_is_refused():
     with pytest.raises(ValueError, match="'best' is not allowed"):
         select("best", bent_front(), CENTRE)
