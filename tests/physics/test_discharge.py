@@ -73,7 +73,7 @@ def test_spheres_that_left_meet_nobody(simulate):
             sim.advance(120)
             assert sim.count == 1
             assert sim.max_overlap == 0.0
-            assert sim.max_speed_ratio <= 1.0
+            assert sim.max_speed_ratio <= 1.001  # the start is half a step old
             assert np.isnan(sim.by_identity(sim.spheres.position)[:2]).all()
 
 
@@ -177,7 +177,7 @@ def test_speed_monitor_compares_with_free_fall(simulate):
     thrown = [[1.0, 0.0, 0.0], [0.0, 0.0, -2.0], [0.0, 0.0, 0.0]]
     sim = simulate([[0.0, 0.0, 0.5], [1.0, 0.0, 0.5], [2.0, 0.0, 0.5]], 0.001, thrown, gravity=G)
     sim.advance(3000)
-    assert 0.99 < sim.max_speed_ratio <= 1.0
+    assert sim.max_speed_ratio == pytest.approx(1.0, abs=1e-3)
     sim = simulate([[0.0, 0.0, 0.5]], 0.001, [[0.0, 0.0, -2.0]], gravity=G)
     sim.advance(1000)
     sim.spheres.velocity[0] *= 1.7

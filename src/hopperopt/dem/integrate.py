@@ -21,7 +21,8 @@ def kick_and_drift(spheres, counters, monitors, settings):
     """Advance velocities and spins by one step's forces, brake the spins, then move the spheres.
 
     Marks the lists stale when a sphere has left its skin (or is no longer a number). Notes the largest
-    squared ratio of speed to the fall speed sqrt(v0^2 + 2 g (highest start - z)). Returns how many spheres
+    squared ratio of speed to the fall speed sqrt(v0^2 + 2 g (highest start - z)), both at the time of the
+    positions that the forces belong to: the mean of the old and the new velocity. Returns how many spheres
     have just passed the sensor.
     """
     dt, g = settings.time_step, settings.gravity
@@ -38,12 +39,13 @@ def kick_and_drift(spheres, counters, monitors, settings):
         per_mass, per_inertia = dt / mass, dt / inertia
         speed2 = moved2 = 0.0
         for a in range(3):
-            v = velocity[i, a] + force[i, a] * per_mass + g[a] * dt
+            kick = force[i, a] * per_mass + g[a] * dt
+            v = velocity[i, a] + kick
             x = position[i, a] + v * dt
             velocity[i, a] = v
             position[i, a] = x
             spin[i, a] += torque[i, a] * per_inertia
-            speed2 += v * v
+            speed2 += (v - 0.5 * kick) ** 2
             moved2 += (x - reference[i, a]) ** 2
         if rolling_limit[i] > 0.0:
             keep = braked((spin[i, 0], spin[i, 1], spin[i, 2]), rolling_limit[i], inertia, dt)
@@ -52,7 +54,8 @@ def kick_and_drift(spheres, counters, monitors, settings):
         stale |= not moved2 <= skin[i] ** 2
         z = position[i, 2]
         beyond += PARKED / 2.0 < z < settings.sensor
-        head = settings.start_speed2 + 2.0 * weight * max(settings.highest - z, 0.0)
+        before = z - velocity[i, 2] * dt
+        head = settings.start_speed2 + 2.0 * weight * max(settings.highest - before, 0.0)
         if speed2 > fastest * head:
             fastest = speed2 / head
     monitors[SPEED] = fastest
