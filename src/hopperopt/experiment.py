@@ -268,7 +268,9 @@ SCALARS = {
     "residual_count": _about("number of particles that stayed"),
     "residual_mass_fraction": _about("mass fraction that stayed"),
     "max_overlap": _about("largest overlap over the smaller radius"),
-    "max_speed_ratio": _about("largest speed, at the positions' time, over that of free fall from the highest start"),
+    "max_speed_ratio": _about(
+        "largest speed, at the positions' time, over that of free fall from the highest start"
+    ),
     "max_energy_gain": _about("largest gain of mechanical energy over the potential energy released"),
     "lost_particles": _about("number of particles seen outside the walls"),
     "step_count": _about("number of time steps"),

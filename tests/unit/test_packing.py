@@ -23,7 +23,7 @@ def test_no_sphere_overlaps_another(solid_fraction):
 
 
 def test_spheres_lie_in_the_column():
-    """Centres within the radius given, lowest points above the bottom, the height that the fraction asks for."""
+    """Centres within the radius, lowest points above the bottom, as high as the fraction asks for."""
     position = column()
     assert np.hypot(position[:, 0], position[:, 1]).max() <= COLUMN
     assert (position[:, 2] - RADII).min() >= BOTTOM
@@ -35,7 +35,7 @@ def test_every_size_is_spread_evenly_over_the_column():
     """Heights and squared distances from the axis are uniform, for each size (Kolmogorov and Smirnov)."""
     position = column()
     for size in np.unique(RADII):
-        x, y, z = position[RADII == size].T
+        x, y, z = position[size == RADII].T
         assert kstest((x**2 + y**2) / COLUMN**2, "uniform").pvalue > 0.001
         assert kstest((z - z.min()) / np.ptp(z), "uniform").pvalue > 0.001
 
