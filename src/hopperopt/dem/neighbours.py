@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from hopperopt.dem.state import COUNT, NEEDED, NEVER, PAIR_CARRIED, PARKED, REMOVED, STEP
+from hopperopt.dem.state import COUNT, NEEDED, NEVER, PAIR_CARRIED, PARKED, STEP
 
 CELLS_PER_SPHERE = 8  # a coarser grid is used beyond, so that one sphere far away costs no memory
 
@@ -47,7 +47,6 @@ def drop_parked(spheres, counters):
             spheres.mass[kept] = spheres.mass[i]
             spheres.identity[kept] = spheres.identity[i]
         kept += 1
-    counters[REMOVED] += counters[COUNT] - kept
     counters[COUNT] = kept
 
 
@@ -158,12 +157,19 @@ def list_pairs(spheres, pairs, count, first, corner, size, cells):
 
 
 @njit(cache=True)
-def restore_pairs(spheres, pairs, counters):
-    """Put the springs set aside into the new list; a pair whose order flipped changes its sign."""
-    count = counters[COUNT]
+def rows_by_identity(spheres, count):
+    """Row of each sphere under its identity, (n,) int64; -1 for one that has left."""
     row = np.full(len(spheres.identity), -1, np.int64)
     for i in range(count):
         row[spheres.identity[i]] = i
+    return row
+
+
+@njit(cache=True)
+def restore_pairs(spheres, pairs, counters):
+    """Put the springs set aside into the new list; a pair whose order flipped changes its sign."""
+    count = counters[COUNT]
+    row = rows_by_identity(spheres, count)
     for k in range(pairs.start[count]):
         pairs.touched[k] = NEVER
     for c in range(counters[PAIR_CARRIED]):

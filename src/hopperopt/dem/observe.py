@@ -1,8 +1,7 @@
-"""Sums over the state: energies, momenta."""
+"""Sums over the state: energies."""
 
 import math
 
-import numpy as np
 from numba import njit
 
 from hopperopt.dem.contacts import deepest
@@ -69,15 +68,3 @@ def energies(spheres, pairs, touches, walls, counters, settings):
     """Kinetic, gravitational and elastic energy, J."""
     kinetic, potential = motion_energies(spheres, counters, settings)
     return kinetic, potential, spring_energy(spheres, pairs, touches, walls, counters, settings)
-
-
-def momenta(spheres, rows):
-    """Linear momentum (3,) kg m/s and angular momentum about the origin (3,) kg m2/s.
-
-    Exactly conserved by the scheme without walls and gravity when taken with the positions before the drift,
-    i.e. for the velocities' own half step: x x v is the same at both ends of a drift along v.
-    """
-    m = spheres.mass[:rows, None]
-    x, v, w = spheres.position[:rows], spheres.velocity[:rows], spheres.spin[:rows]
-    inertia = 0.4 * m * spheres.radius[:rows, None] ** 2
-    return (m * v).sum(axis=0), (m * np.cross(x, v) + inertia * w).sum(axis=0)

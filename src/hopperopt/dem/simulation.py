@@ -12,12 +12,12 @@ from hopperopt.dem.state import (
     OPENED,
     OVERLAP,
     PAIR_CARRIED,
-    REMOVED,
     ROLLING,
     SPEED,
     STALE,
     STEP,
     TOUCH_CARRIED,
+    Law,
     Settings,
     grown,
     make_pairs,
@@ -99,11 +99,6 @@ class Simulation:
         return int(self.counters[COUNT])
 
     @property
-    def removed(self):
-        """Spheres dropped from the arrays so far."""
-        return int(self.counters[REMOVED])
-
-    @property
     def max_overlap(self):
         """Largest overlap over the smaller radius so far."""
         return float(self.monitors[OVERLAP])
@@ -171,17 +166,15 @@ class Simulation:
 
 def compile_solver():
     """Compile (or load from the cache) all that a run calls."""
-    law = (1.0e6, 1.0e6, 0.5, 0.5, 0.05)
-    from hopperopt.dem.state import Law
-
+    law = Law(1.0e6, 1.0e6, 0.5, 0.5, 0.05)
     simulation = Simulation(
         [[0.0, 0.0, 0.0009]],
         np.zeros((1, 3)),
         [0.001],
         1000.0,
         {"floor": [[0, 0], [1, 0]]},
-        Law(*law),
-        Law(*law),
+        law,
+        law,
         1e-6,
     )
     simulation.advance(1)

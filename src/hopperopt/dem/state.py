@@ -81,7 +81,7 @@ ROLLING_NONE, ROLLING_EDEM, ROLLING_CDT = 0, 1, 2
 ROLLING = {"none": ROLLING_NONE, "edem": ROLLING_EDEM, "cdt": ROLLING_CDT}
 
 # Integer counters of a run, in one array that the compiled code updates.
-COUNT, STEP, OPENED, STALE, REBUILDS, PAIR_CARRIED, TOUCH_CARRIED, REMOVED, NEEDED = COUNTERS = range(9)
+COUNT, STEP, OPENED, STALE, REBUILDS, PAIR_CARRIED, TOUCH_CARRIED, NEEDED = COUNTERS = range(8)
 # Float monitors: largest overlap over the smaller radius, largest squared ratio of a speed to the fall speed.
 OVERLAP, SPEED = range(2)
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from hopperopt.dem.neighbours import rows_by_identity
 from hopperopt.dem.state import COUNT, NEEDED, TOUCH_CARRIED
 
 SMOOTH_ANGLE = math.radians(15.0)
@@ -268,9 +269,7 @@ def list_touches(spheres, touches, walls, count):
 def restore_touches(spheres, touches, counters):
     """Put the springs set aside into the new wall list."""
     count = counters[COUNT]
-    row = np.full(len(spheres.identity), -1, np.int64)
-    for i in range(count):
-        row[spheres.identity[i]] = i
+    row = rows_by_identity(spheres, count)
     for k in range(touches.start[count]):
         touches.element[k] = -1
         for a in range(3):
