@@ -1,6 +1,7 @@
 # make                     the locked environment in .venv, then the full study
 # make setup               the environment alone
 # make test, make lint     in the same environment: the tests; style and the boundaries between modules
+# make validation         the solver against closed forms and other codes: rewrites docs/validation.md; CASE=name for one
 # make lock                the newest versions of all libraries into requirements.lock
 # make PYTHON=python3.12   another Python for the environment;   make CORES=4   fewer cores for the study
 
@@ -10,7 +11,7 @@ install := .venv/bin/python -m pip install -qq --disable-pip-version-check --no-
 suitable := import ensurepip, sys, venv; sys.exit(sys.implementation.name != "cpython" or not (3, 11) <= sys.version_info < (3, 15))
 version = $(shell $(1) -c 'import sys; print(sys.version)' 2>/dev/null)
 
-.PHONY: study setup test lint lock
+.PHONY: study setup test lint validation lock
 study: setup
 	.venv/bin/snakemake --cores $(CORES)
 
@@ -18,6 +19,9 @@ setup: $(stamp)
 
 test: setup
 	.venv/bin/python -m pytest
+
+validation: setup
+	.venv/bin/python -m validation $(CASE)
 
 lint: setup
 	.venv/bin/ruff check .

@@ -1,0 +1,1 @@
+"""The solver against closed forms, independent solutions and another code: `make validation`."""
