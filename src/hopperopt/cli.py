@@ -132,6 +132,12 @@ def _seed(text: str) -> int:
     return int(text)
 
 
+def _threads(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not allowed; allowed: a whole number from 1")
+    return int(text)
+
+
 def _run_stage(given: argparse.Namespace) -> None:
     """Call the stage's function with its parameters, inputs and outputs."""
     inputs = [getattr(given, option.rstrip("*")) for option in given.stage.inputs]
@@ -163,6 +169,9 @@ def _add_simulate(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--seed", type=_seed, metavar="N", help="seed of the filling (default: from the study's)"
     )
+    command.add_argument(
+        "--threads", type=_threads, metavar="N", help="threads to work with (default: the configuration's)"
+    )
     command.add_argument("--case", type=_json, metavar="JSON", help=argparse.SUPPRESS)
     command.add_argument("--design", nargs="*", default=[], metavar="YAML", help=argparse.SUPPRESS)
     command.add_argument("--output", type=Path, required=True, metavar="FILE", help="netCDF file to write")
@@ -171,16 +180,17 @@ def _add_simulate(command: argparse.ArgumentParser) -> None:
 
 def _simulate(given: argparse.Namespace) -> None:
     """Run one simulation and write its file, with all that says how it was made."""
-    case = _case(given)
+    case, threads = _case(given)
+    threads = given.threads or threads
     # The workflow's digest only makes Snakemake run this anew; what is recorded is the code that runs.
     case.pop("code", None)
     given.output.parent.mkdir(parents=True, exist_ok=True)
-    provenance.compile_solver()
+    provenance.compile_solver(threads)
     from hopperopt import dataset, experiment, files
     from hopperopt.progress import Reporter
 
     with Reporter(sys.stderr) as progress:
-        run = experiment.run(case, progress=progress)
+        run = experiment.run(case, progress=progress, threads=threads)
     run.attrs |= provenance.attributes() | {
         "case": json.dumps(case, sort_keys=True),
         "code_digest": provenance.code_digest(f"hopperopt.{SIMULATION}"),
@@ -195,16 +205,16 @@ def _simulate(given: argparse.Namespace) -> None:
     print(f"{given.output}: {dataset.outcome(run)}", file=sys.stderr)
 
 
-def _case(given: argparse.Namespace) -> dict:
-    """The case to simulate: the workflow's, that of a design found by the study, or one set by hand."""
+def _case(given: argparse.Namespace) -> tuple[dict, int]:
+    """The case to simulate (the workflow's, that of a design the study found, one by hand); threads."""
     if given.case is not None and not given.design:
-        return given.case
+        return given.case, 1
     from hopperopt import config
 
     if given.case is not None:
         from hopperopt import files
 
-        return config.derived_case(given.case, files.read_yaml(given.design[0])["design"])
+        return config.derived_case(given.case, files.read_yaml(given.design[0])["design"]), 1
     study = config.parse(config.load(given.configfile), Path.cwd())
     typed = _typed_factors(given)
     if given.no_insert:
@@ -213,7 +223,7 @@ def _case(given: argparse.Namespace) -> dict:
         case = study.simulation_case(None, "by_hand", 1)
     else:
         case = config.derived_case(study.derived_params("by_hand", 1), _design(study, typed))
-    return case if given.seed is None else case | {"seed": given.seed}
+    return case if given.seed is None else case | {"seed": given.seed}, study.simulation.threads
 
 
 def _typed_factors(given: argparse.Namespace) -> dict[str, str]:

@@ -227,10 +227,11 @@ class Discharge(Model):
 
 
 class Simulation(Model):
-    """Time step (`auto`: a fifth of the Rayleigh time) and gravity."""
+    """Time step (`auto`: a fifth of the Rayleigh time), gravity, and the threads of one run."""
 
     time_step_s: Annotated[float | Literal["auto"], Number(above=0)] = 4.0e-5
     gravity_m_s2: Annotated[float, Number(above=0, most=1000)] = 9.81
+    threads: Annotated[int, Number(least=1, most=1024)] = 1
 
 
 class Setup(Model):

@@ -37,17 +37,18 @@ class Progress:
     remaining: float | None  # s of wall time to go, where it can be told
 
 
-def run(case, progress=None):
+def run(case, progress=None, threads=1):
     """Simulate one experiment.
 
-    Arguments: the case; `progress`, called with a `Progress` about once a second. Returns the run's data set:
-    exit times, diameters, size classes and two sets of positions by particle, and scalars (see `_dataset`). A
-    run that jams, ends at a limit or breaks a monitor returns as well: its `status` says so.
+    Arguments: the case; `progress`, called with a `Progress` about once a second; `threads` to work with,
+    which change no bit of what is simulated. Returns the run's data set: exit times, diameters, size classes
+    and two sets of positions by particle, and scalars (see `dataset`). A run that jams, ends at a limit or
+    breaks a monitor returns as well: its `status` says so.
     """
-    return _Experiment(case, progress).run()
+    return _Experiment(case, progress, threads).run()
 
 
-def build(case):
+def build(case, threads=1):
     """The simulation of a case at its start: spheres scattered in the column, all walls closed."""
     generator = np.random.default_rng(case["seed"])
     particles, filling, contact = case["particles"], case["filling"], case["contact"]
@@ -71,16 +72,17 @@ def build(case):
         case["time_step"],
         gravity=case["gravity"],
         rolling=contact["rolling"],
+        threads=threads,
     )
 
 
 class _Experiment:
     """The state of one run beyond the solver's: what has been observed so far."""
 
-    def __init__(self, case, progress):
+    def __init__(self, case, progress, threads):
         self.case = case
         self.progress = progress
-        self.simulation = build(case)
+        self.simulation = build(case, threads)
         spheres = self.simulation.spheres
         order = np.argsort(spheres.identity)
         self.diameter = 2.0 * spheres.radius[order]

@@ -172,9 +172,9 @@ def numba_cache_lock() -> Iterator[None]:
         yield
 
 
-def compile_solver() -> None:
-    """Compile the solver, or load it compiled: once per process, before the first time step."""
+def compile_solver(threads: int = 1) -> None:
+    """Compile the solver for so many threads, or load it compiled: before a process's first time step."""
     with numba_cache_lock():
         from hopperopt.dem.simulation import compile_solver as compile_all
 
-        compile_all()
+        compile_all(threads)

@@ -15,7 +15,7 @@ FLOOR = {"floor": [[0.0, 0.0], [1.0, 0.0]]}
 
 def law_of(law, overlap, velocity, spring, dt=4.0e-5):
     """The law for a contact with the floor: normal +z."""
-    return hertz_mindlin(overlap, (0.0, 0.0, 1.0), velocity, spring, RADIUS, MASS, law, dt)
+    return hertz_mindlin(overlap, (0.0, 0.0, 1.0), velocity, spring, RADIUS, MASS, 1.0 / MASS, law, dt)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.2, 0.7, 1.0])
@@ -44,7 +44,7 @@ def test_spring_stays_in_the_tangent_plane(wall_law):
     """Whatever a turning normal leaves along n is dropped from the spring, and never pushes."""
     n = np.array([0.6, 0.0, 0.8])
     _, _, force, spring = hertz_mindlin(
-        2e-5, tuple(n), (0.01, 0.02, -0.03), (1e-7, 2e-7, 3e-7), RADIUS, MASS, wall_law(), 4e-5
+        2e-5, tuple(n), (0.01, 0.02, -0.03), (1e-7, 2e-7, 3e-7), RADIUS, MASS, 1.0 / MASS, wall_law(), 4e-5
     )
     assert np.dot(spring, n) == pytest.approx(0.0, abs=1e-20)
     assert np.dot(force, n) == pytest.approx(0.0, abs=1e-15)

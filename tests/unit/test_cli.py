@@ -10,14 +10,15 @@ from hopperopt import cli, experiment, files, provenance
 @pytest.fixture
 def simulated(monkeypatch, tmp_path, make_run):
     """Function that runs `simulate` with a solver that only writes down its case; returns case and file."""
-    cases = []
+    cases, used = [], []
 
-    def run(case, progress=None):
+    def run(case, progress=None, threads=1):
         cases.append(case)
+        used.append(threads)
         return make_run(status="jammed", stayed=20, filling_level=0.060).assign_attrs(wall_time_s=1.0)
 
     monkeypatch.setattr(experiment, "run", run)
-    monkeypatch.setattr(provenance, "compile_solver", lambda: None)
+    monkeypatch.setattr(provenance, "compile_solver", lambda threads: None)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "config.yaml").write_text("filling: {particles: 60}\n")
 
@@ -25,7 +26,21 @@ def simulated(monkeypatch, tmp_path, make_run):
         assert cli.main(["simulate", *options, "--output", "out/run.nc"]) == 0
         return cases[-1], files.read_netcdf(tmp_path / "out" / "run.nc")
 
+    simulate.threads = used
     return simulate
+
+
+def test_threads_are_the_configurations_unless_typed(simulated, tmp_path, capsys):
+    case, _ = simulated("--no-insert")
+    (tmp_path / "config.yaml").write_text("filling: {particles: 60}\nsimulation: {threads: 3}\n")
+    threaded, _ = simulated("--no-insert")
+    assert threaded == case  # no part of what a run depends on
+    simulated("--no-insert", "--threads", "2")
+    simulated("--case", json.dumps(case))
+    assert simulated.threads == [1, 3, 2, 1]
+    with pytest.raises(SystemExit):
+        simulated("--no-insert", "--threads", "none")
+    assert "--threads: none is not allowed; allowed: a whole number from 1" in capsys.readouterr().err
 
 
 def test_a_simulation_by_hand_has_the_design_that_was_typed(simulated):

@@ -8,8 +8,8 @@ rule simulate:
         result("logs/simulate/{experiment}_rep_{replicate}.tsv")
     params:
         case=experiment_params,
-    threads: 1
+    threads: STUDY.simulation.threads
     resources:
         **simulation_resources(),
     shell:
-        "python -m hopperopt simulate --case {params.case:q} --output {output:q} > {log:q} 2>&1"
+        "python -m hopperopt simulate --case {params.case:q} --threads {threads} --output {output:q} > {log:q} 2>&1"

@@ -10,12 +10,12 @@ rule verify_simulate:
         result("logs/verify_simulate/{case}_rep_{replicate}.tsv")
     params:
         case=verification_params,
-    threads: 1
+    threads: STUDY.simulation.threads
     resources:
         **simulation_resources(),
     shell:
         "python -m hopperopt simulate --case {params.case:q} --design {input.design:q} "
-        "--output {output:q} > {log:q} 2>&1"
+        "--threads {threads} --output {output:q} > {log:q} 2>&1"
 
 
 rule verify:

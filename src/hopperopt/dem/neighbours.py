@@ -11,23 +11,39 @@ import math
 import numpy as np
 from numba import njit
 
-from hopperopt.dem.state import COUNT, NEEDED, NEVER, PAIR_CARRIED, PARKED, STEP
+from hopperopt.dem.state import (
+    CHUNKS,
+    COUNT,
+    MOST_CHUNKS,
+    NEEDED,
+    NEVER,
+    ONE,
+    PAIR_CARRIED,
+    PARKED,
+    PLACE,
+    RADIUS,
+    SKIN,
+    STEP,
+    TWO,
+    VECTOR,
+)
 
+LEAST_CHUNK = 1.5  # rows of a chunk, on average, over those that pairs reach ahead
 CELLS_PER_SPHERE = 8  # a coarser grid is used beyond, so that one sphere far away costs no memory
 
 
 @njit(cache=True)
 def carry_pairs(spheres, pairs, counters):
     """Set the springs of touching pairs aside, under the identities of the two spheres."""
-    found = 0
-    for i in range(counters[COUNT]):
-        for k in range(pairs.start[i], pairs.start[i + 1]):
-            if pairs.touched[k] == counters[STEP] - 1:
-                pairs.carried[found, 0] = spheres.identity[i]
-                pairs.carried[found, 1] = spheres.identity[pairs.partner[k]]
-                for a in range(3):
-                    pairs.carried_spring[found, a] = pairs.spring[k, a]
-                found += 1
+    carried, carried_spring, spring = pairs.carried, pairs.carried_spring, pairs.spring
+    found = np.uint64(0)
+    for k in range(np.uint64(pairs.start[counters[COUNT]])):
+        # Written first, kept by moving on: no branch to mispredict.
+        carried[found, 0] = spheres.identity[pairs.owner[k]]
+        carried[found, 1] = spheres.identity[pairs.partner[k]]
+        for a in range(VECTOR):
+            carried_spring[found, a] = spring[k, a]
+        found += np.uint64(pairs.touched[k] == counters[STEP] - 1)
     counters[PAIR_CARRIED] = found
 
 
@@ -36,14 +52,11 @@ def drop_parked(spheres, counters):
     """Close the gaps that removed spheres left; the order of the others stays."""
     kept = 0
     for i in range(counters[COUNT]):
-        if spheres.position[i, 2] <= PARKED / 2.0:
+        if spheres.place[i, 2] <= PARKED / 2.0:
             continue
         if kept != i:
-            for a in range(3):
-                spheres.position[kept, a] = spheres.position[i, a]
-                spheres.velocity[kept, a] = spheres.velocity[i, a]
-                spheres.spin[kept, a] = spheres.spin[i, a]
-            spheres.radius[kept] = spheres.radius[i]
+            spheres.place[kept] = spheres.place[i]
+            spheres.motion[kept] = spheres.motion[i]
             spheres.mass[kept] = spheres.mass[i]
             spheres.identity[kept] = spheres.identity[i]
         kept += 1
@@ -57,10 +70,10 @@ def grow_skins(spheres, count, settings):
     for i in range(count):
         squared = 0.0
         for a in range(3):
-            spheres.reference[i, a] = spheres.position[i, a]
-            squared += spheres.velocity[i, a] ** 2
+            spheres.anchor[i, a] = spheres.place[i, a]
+            squared += spheres.motion[i, a] ** 2
         skin = min(settings.skin + settings.horizon * math.sqrt(squared), settings.skin_limit)
-        spheres.skin[i] = skin
+        spheres.anchor[i, SKIN] = skin
         largest = max(largest, skin)
     return largest
 
@@ -73,8 +86,8 @@ def make_grid(spheres, count, reach):
     high = np.full(3, -np.inf)
     for i in range(count):
         for a in range(3):
-            low[a] = min(low[a], spheres.position[i, a])
-            high[a] = max(high[a], spheres.position[i, a])
+            low[a] = min(low[a], spheres.place[i, a])
+            high[a] = max(high[a], spheres.place[i, a])
     size = reach
     cells = np.ones(3, np.int64)
     while True:
@@ -91,29 +104,26 @@ def sort_by_cell(spheres, count, corner, size, cells):
     index = np.empty(count, np.int64)
     first = np.zeros(cells[0] * cells[1] * cells[2] + 1, np.int64)
     for i in range(count):
-        x = int((spheres.position[i, 0] - corner[0]) / size)
-        y = int((spheres.position[i, 1] - corner[1]) / size)
-        z = int((spheres.position[i, 2] - corner[2]) / size)
+        x = int((spheres.place[i, 0] - corner[0]) / size)
+        y = int((spheres.place[i, 1] - corner[1]) / size)
+        z = int((spheres.place[i, 2] - corner[2]) / size)
         index[i] = (z * cells[1] + y) * cells[0] + x
         first[index[i] + 1] += 1
     for c in range(len(first) - 1):
         first[c + 1] += first[c]
-    place = first.copy()
+    slot = first.copy()
     order = np.empty(count, np.int64)
     for i in range(count):
-        order[place[index[i]]] = i
-        place[index[i]] += 1
-    for vectors in (spheres.position, spheres.velocity, spheres.spin, spheres.reference):
-        old = vectors[:count].copy()
+        order[slot[index[i]]] = i
+        slot[index[i]] += 1
+    for rows in (spheres.place, spheres.motion, spheres.anchor):
+        old = rows[:count].copy()
         for i in range(count):
-            for a in range(3):
-                vectors[i, a] = old[order[i], a]
-    for values in (spheres.radius, spheres.mass, spheres.skin):
-        kept = values[:count].copy()
-        for i in range(count):
-            values[i] = kept[order[i]]
-    names = spheres.identity[:count].copy()
+            for a in range(rows.shape[1]):
+                rows[i, a] = old[order[i], a]
+    masses, names = spheres.mass[:count].copy(), spheres.identity[:count].copy()
     for i in range(count):
+        spheres.mass[i] = masses[order[i]]
         spheres.identity[i] = names[order[i]]
     return first
 
@@ -124,15 +134,18 @@ def list_pairs(spheres, pairs, count, first, corner, size, cells):
 
     Rows ahead of i in the same and the next cell of its x row, then the four x rows ahead in y and z.
     """
-    position, radius, skin = spheres.position, spheres.radius, spheres.skin
-    partner, owner = pairs.partner, pairs.owner
-    capacity = len(partner)
-    nx, ny, nz = cells
-    found = 0
+    around = np.empty(PLACE * np.uint64(count))  # position, radius and skin together, flat
     for i in range(count):
-        pairs.start[i] = min(found, capacity)
-        x, y, z = position[i, 0], position[i, 1], position[i, 2]
-        own = radius[i] + skin[i]
+        for a in range(3):
+            around[4 * i + a] = spheres.place[i, a]
+        around[4 * i + 3] = spheres.place[i, RADIUS] + spheres.anchor[i, SKIN]
+    partner, owner = pairs.partner, pairs.owner
+    spare = np.uint64(len(partner) - 1)
+    nx, ny, nz = cells
+    found = np.uint64(0)
+    for i in range(count):
+        pairs.start[i] = min(found, spare)
+        x, y, z, own = around[4 * i], around[4 * i + 1], around[4 * i + 2], around[4 * i + 3]
         cx = int((x - corner[0]) / size)
         cy = int((y - corner[1]) / size)
         cz = int((z - corner[2]) / size)
@@ -144,16 +157,51 @@ def list_pairs(spheres, pairs, count, first, corner, size, cells):
             line = (rz * ny + ry) * nx
             begin = i + 1 if row == 0 else first[line + max(cx - 1, 0)]
             end = first[line + min(cx + 1, nx - 1) + 1]
-            for j in range(begin, end):
-                dx, dy, dz = x - position[j, 0], y - position[j, 1], z - position[j, 2]
-                reach = own + radius[j] + skin[j]
+            for j in range(np.uint64(begin), np.uint64(max(begin, end))):
+                k = PLACE * j
+                dx, dy, dz = x - around[k], y - around[k + ONE], z - around[k + TWO]
+                reach = own + around[k + RADIUS]
                 # Written first, kept by moving on: no branch to mispredict.
-                place = min(found, capacity - 1)
-                partner[place] = j
-                owner[place] = i
-                found += dx * dx + dy * dy + dz * dz < reach * reach
-    pairs.start[count] = min(found, capacity)
+                partner[min(found, spare)] = j
+                found += np.uint64(dx * dx + dy * dy + dz * dz < reach * reach)
+        for k in range(np.uint64(pairs.start[i]), min(found, spare)):
+            owner[k] = i
+    pairs.start[count] = min(found, spare)
     return found
+
+
+@njit(cache=True)
+def divide(spheres, pairs, chunks, counters):
+    """Divide the rows into chunks of about equal work, after the state alone.
+
+    On average they are at least 3/2 as long as the pairs of any row reach ahead, so that all windows together
+    are at most 2/3 as long as the rows; their number is a power of two, so that few threads share them
+    evenly.
+    """
+    count = counters[COUNT]
+    ahead = 1
+    for k in range(pairs.start[count]):
+        ahead = max(ahead, np.int64(pairs.partner[k]) - np.int64(pairs.owner[k]))
+    number = 1
+    while 2 * number <= MOST_CHUNKS and count >= 2 * number * LEAST_CHUNK * ahead:
+        number *= 2
+    counters[CHUNKS] = number
+    work = count + np.int64(pairs.start[count])
+    i = 0
+    for c in range(number):
+        while i < count and number * (i + np.int64(pairs.start[i])) < c * work:
+            i += 1
+        chunks.first[c] = i
+    chunks.first[number] = count
+    room = len(spheres.mass)
+    for c in range(number):
+        end = chunks.first[c + 1]
+        last = end - 1
+        for k in range(pairs.start[chunks.first[c]], pairs.start[end]):
+            last = max(last, np.int64(pairs.partner[k]))
+        chunks.reach[c] = last + 1
+        chunks.window[c] = room
+        room += last + 1 - end
 
 
 @njit(cache=True)
@@ -198,7 +246,7 @@ def rebuild_pairs(spheres, pairs, counters, settings):
     largest_skin = grow_skins(spheres, count, settings)
     largest_radius = 0.0
     for i in range(count):
-        largest_radius = max(largest_radius, spheres.radius[i])
+        largest_radius = max(largest_radius, spheres.place[i, RADIUS])
     reach = 2.0 * (largest_radius + largest_skin)
     corner, size, cells = make_grid(spheres, count, reach)
     first = sort_by_cell(spheres, count, corner, size, cells)

@@ -2,10 +2,13 @@
 
 import math
 
+import numba
 import numpy as np
 
 from hopperopt.dem import observe
+from hopperopt.dem.contacts import BLOCK
 from hopperopt.dem.state import (
+    CHUNKS,
     COUNT,
     COUNTERS,
     NEEDED,
@@ -18,17 +21,27 @@ from hopperopt.dem.state import (
     STEP,
     TOUCH_CARRIED,
     Law,
+    Laws,
     Settings,
     grown,
+    make_chunks,
     make_pairs,
     make_spheres,
     make_touches,
 )
-from hopperopt.dem.step import DONE, NOT_FINITE, NOTHING_CARRIED, PAIRS_FULL, advance
+from hopperopt.dem.step import (
+    DONE,
+    NOT_FINITE,
+    NOTHING_CARRIED,
+    PAIRS_FULL,
+    advance,
+    advance_threaded,
+    collect_overlaps,
+)
 from hopperopt.dem.walls import make_walls, open_wall
 
-HORIZON_STEPS = 25  # a moving sphere's skin lasts about this many steps
-SKIN = 0.05  # skin of a resting sphere over the largest radius
+HORIZON_STEPS = 30  # a moving sphere's skin lasts about this many steps
+SKIN = 0.08  # skin of a resting sphere over the largest radius
 SKIN_LIMIT = 0.75  # largest skin over the largest radius
 
 
@@ -42,33 +55,35 @@ class Simulation:
     Arguments: `position`, `velocity`, `spin` (n, 3) in m, m/s, rad/s; `radius` (n,) m; `density` kg/m3;
     `walls`, a dict of name -> (points, 2) revolved profile in m; `pair_law` and `wall_law` from
     `materials.contact_law`; `time_step` s; `gravity` m/s2, downward or a (3,) vector; `rolling` "edem", "cdt"
-    or "none".
+    or "none"; `threads` to work with, which changes nothing but the speed.
     """
 
     def __init__(
         self, position, velocity, radius, density, walls, pair_law, wall_law, time_step,
-        gravity=9.81, rolling="edem", spin=None,
+        gravity=9.81, rolling="edem", spin=None, threads=1,
     ):  # fmt: skip
         self.spheres = make_spheres(position, velocity, radius, density, spin)
         n = len(self.spheres.radius)
         self.walls = make_walls(list(walls.values()))
         self.wall_names = list(walls)
-        self.pairs = make_pairs(n, 8 * n + 64)
-        self.touches = make_touches(n, n + 64)
+        self.pairs = make_pairs(n, 4 * n + 64)
+        self.touches = make_touches(n, n // 4 + 64)
+        self.chunks = make_chunks(len(walls), BLOCK)
+        self.threads = threads
         self.exit_time = np.full(n, np.nan)  # by identity, s
         self.counters = np.zeros(len(COUNTERS), np.int64)
         self.counters[COUNT] = n
         self.counters[STALE] = 1
         self.counters[[PAIR_CARRIED, TOUCH_CARRIED]] = NOTHING_CARRIED
         self.monitors = np.zeros(2)
+        collect_overlaps(self.chunks, self.monitors)
+        self.laws = Laws(pair_law, wall_law)
         largest = float(self.spheres.radius.max())
         speed2 = (self.spheres.velocity**2).sum(axis=1)
         gravity = np.asarray(gravity, dtype=np.float64)
         self.settings = Settings(
             time_step=float(time_step),
             gravity=gravity if gravity.shape == (3,) else np.array([0.0, 0.0, -float(gravity)]),
-            pair_law=pair_law,
-            wall_law=wall_law,
             rolling=ROLLING[rolling],
             skin=SKIN * largest,
             horizon=HORIZON_STEPS * float(time_step),
@@ -110,11 +125,16 @@ class Simulation:
 
     def advance(self, steps):
         """Run `steps` steps. Raises NotFinite when the run has blown up."""
+        run = advance
+        if self.threads > 1:
+            run = advance_threaded
+            numba.set_num_threads(min(self.threads, numba.config.NUMBA_NUM_THREADS))
         while steps > 0:
-            outcome, done = advance(
-                self.spheres, self.pairs, self.touches, self.walls, self.exit_time,
-                self.counters, self.monitors, self.settings, steps,
+            outcome, done = run(
+                self.spheres, self.pairs, self.touches, self.walls, self.chunks, self.exit_time,
+                self.counters, self.monitors, self.laws, self.settings, steps,
             )  # fmt: skip
+            collect_overlaps(self.chunks, self.monitors)
             steps -= done
             if outcome == NOT_FINITE:
                 raise NotFinite(f"a sphere's position is not finite after {self.steps} steps")
@@ -155,17 +175,17 @@ class Simulation:
 
     def wall_force(self, wall):
         """Force of the spheres on a wall in the last step, (3,) N."""
-        return self.walls.force[self.wall_names.index(wall)].copy()
+        return self.chunks.wall_force[: self.counters[CHUNKS], self.wall_names.index(wall)].sum(axis=0)
 
     def energy(self):
         """Kinetic, gravitational and elastic energy (J), all at the middle of the last step."""
         return observe.energies(
-            self.spheres, self.pairs, self.touches, self.walls, self.counters, self.settings
+            self.spheres, self.pairs, self.touches, self.walls, self.counters, self.laws, self.settings
         )
 
 
-def compile_solver():
-    """Compile (or load from the cache) all that a run calls."""
+def compile_solver(threads=1):
+    """Compile (or load from the cache) all that a run on so many threads calls."""
     law = Law(1.0e6, 1.0e6, 0.5, 0.5, 0.05)
     simulation = Simulation(
         [[0.0, 0.0, 0.0009]],
@@ -176,6 +196,7 @@ def compile_solver():
         law,
         law,
         1e-6,
+        threads=threads,
     )
     simulation.advance(1)
     simulation.energy()

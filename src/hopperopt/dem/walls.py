@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from hopperopt.dem.neighbours import rows_by_identity
-from hopperopt.dem.state import COUNT, NEEDED, TOUCH_CARRIED
+from hopperopt.dem.state import COUNT, NEEDED, RADIUS, SKIN, TOUCH_CARRIED
 
 SMOOTH_ANGLE = math.radians(15.0)
 NO_SEGMENT = -1
@@ -36,7 +36,6 @@ class Walls(NamedTuple):
     profile: np.ndarray  # (elements,) int64, index of the wall it belongs to
     closed: np.ndarray  # (elements,) uint8, 0 once the wall is taken away
     surface_start: np.ndarray  # (surfaces + 1,) int64, elements of a surface
-    force: np.ndarray  # (profiles, 3) N, of the spheres on each wall in the last step
 
 
 def make_walls(profiles):
@@ -63,7 +62,7 @@ def make_walls(profiles):
             raise ValueError(f"more than two wall segments meet at r, z = {p}")
     joints = {p: meeting for p, meeting in joints.items() if not _is_disc_centre(p, meeting, segments)}
     surfaces = _chains(segments, joints)
-    return _walls_of(segments, owners, joints, surfaces, len(profiles))
+    return _walls_of(segments, owners, joints, surfaces)
 
 
 def _is_disc_centre(point, meeting, segments):
@@ -111,7 +110,7 @@ def _chains(segments, joints):
     return surfaces + [[("vertex", p)] for p in joints if ("vertex", p) not in inside]
 
 
-def _walls_of(segments, owners, joints, surfaces, profiles):
+def _walls_of(segments, owners, joints, surfaces):
     """The arrays of `Walls` from the grouped elements."""
     items = [item for chain in surfaces for item in chain]
     element_of = {item[1]: e for e, item in enumerate(items) if item[0] == "segment"}
@@ -125,7 +124,6 @@ def _walls_of(segments, owners, joints, surfaces, profiles):
         profile=np.zeros(n, np.int64),
         closed=np.ones(n, np.uint8),
         surface_start=np.cumsum([0] + [len(chain) for chain in surfaces]).astype(np.int64),
-        force=np.zeros((profiles, 3)),
     )
     for e, (kind, key) in enumerate(items):
         if kind == "segment":
@@ -239,13 +237,13 @@ def list_touches(spheres, touches, walls, count):
     """Fill the wall list. Returns the entries needed; beyond the capacity nothing is written."""
     capacity = len(touches.surface)
     boxes = surface_boxes(walls)
-    position, radius, skin, start = spheres.position, spheres.radius, spheres.skin, touches.start
+    place, start = spheres.place, touches.start
     found = 0
     for i in range(count):
         start[i] = min(found, capacity)
-        r = math.sqrt(position[i, 0] ** 2 + position[i, 1] ** 2)
-        z = position[i, 2]
-        reach = radius[i] + skin[i]
+        r = math.sqrt(place[i, 0] ** 2 + place[i, 1] ** 2)
+        z = place[i, 2]
+        reach = place[i, RADIUS] + spheres.anchor[i, SKIN]
         for s in range(len(boxes)):
             if (
                 r + reach < boxes[s, 0]
@@ -257,6 +255,7 @@ def list_touches(spheres, touches, walls, count):
             first, last = elements_within(walls, s, r, z, reach)
             if last >= 0:
                 if found < capacity:
+                    touches.owner[found] = i
                     touches.surface[found] = s
                     touches.first[found] = first
                     touches.last[found] = last
