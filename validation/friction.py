@@ -88,7 +88,8 @@ def incline(restitution, static, rolling, tan, time_step):
     early, _ = motion(sim, arm)
     sim.advance(half)
     late, slip = motion(sim, arm)
-    faintest = 1.0e-3 * GRAVITY * sim.time  # a tenth of what the gentlest slope here beyond a limit gives
+    # A fiftieth of what the gentlest slope here beyond a limit gives; creep would be above it.
+    faintest = 1.0e-4 * GRAVITY * sim.time
     does = np.where(late < faintest, "rests", np.where(slip < faintest, "rolls", "slides"))
     expected = max(0.0, 5.0 / 7.0 * cos * (tan - rolling), cos * (tan - static))
     return does, (late - early) / (half * time_step * GRAVITY), expected
