@@ -32,13 +32,13 @@ LAW = {  # module -> those of its functions that make forces, and motion of them
         "wall_forces", "deepest", "gather_touch", "scatter_touches",
     ),
     "walls": ("nearest",),
-    "integrate": ("kick_and_drift",),
+    "integrate": ("clear_sums", "add_windows", "kick_and_drift"),
     "state": ("make_spheres",),
 }  # fmt: skip
 ASIDE = {  # variables that make no force: statements with one of them are left out
-    "ratio", "worst", "SMALLER", "WORST",  # deepest overlap
-    "weight", "speed2", "head", "fastest", "before",  # fastest sphere
-    "moved2", "stale", "beyond",  # age of the lists, sensor
+    "worst", "worst_smaller", "smaller", "deeper", "SMALLER",  # deepest overlap
+    "twice_weight", "speed2", "head", "fastest",  # fastest sphere
+    "gone2", "moved", "beyond",  # age of the lists, sensor
 }  # fmt: skip
 EQUIVALENT = {  # end of a change -> why it changes nothing
     "- TINY": "1e-300 keeps 0 / 0 away, with either sign",
