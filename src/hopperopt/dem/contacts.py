@@ -259,16 +259,17 @@ def deepest(walls, first, last, r, z, radius):
             if closest and 0.0 < squared < shortest:
                 found, shortest, n_r, n_z = e, squared, dr, dz
     distance = math.sqrt(shortest)
-    return found, radius - distance, n_r / distance, n_z / distance
+    inverse = 1.0 / distance
+    return found, radius - distance, n_r * inverse, n_z * inverse
 
 
 @njit(**FAST)
-def gather_touch(spheres, touches, block, q, i, k, delta, n_r, n_z):
-    """Fill lane q with sphere i against the wall of entry k: l_i = R_i - delta, a wall at rest."""
-    x, y = spheres.place[i, 0], spheres.place[i, 1]
-    r = math.sqrt(x * x + y * y)
+def gather_touch(spheres, touches, block, q, i, k, r, delta, n_r, n_z):
+    """Fill lane q with sphere i, r from the axis, against the wall of entry k: l_i = R_i - delta, a wall at
+    rest."""
+    outwards = n_r / r if r > 0.0 else 0.0
     # On the axis the meridian plane is arbitrary.
-    n = (n_r * x / r, n_r * y / r, n_z) if r > 0.0 else (n_r, 0.0, n_z)
+    n = (outwards * spheres.place[i, 0] if r > 0.0 else n_r, outwards * spheres.place[i, 1], n_z)
     motion, spring = spheres.motion, touches.spring
     w = (motion[i, SPIN], motion[i, SPIN + np.uint64(1)], motion[i, SPIN + np.uint64(2)])
     arm = spheres.place[i, RADIUS] - delta
@@ -335,7 +336,7 @@ def wall_forces(c, spheres, touches, walls, chunks, law, settings):
         touches.element[k] = element
         if element < 0:
             continue
-        gather_touch(spheres, touches, block, lanes, i, k, delta, n_r, n_z)
+        gather_touch(spheres, touches, block, lanes, i, k, r, delta, n_r, n_z)
         entries[lanes] = k
         lanes += np.uint64(1)
         contacts += 1

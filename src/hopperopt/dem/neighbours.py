@@ -29,6 +29,8 @@ from hopperopt.dem.state import (
 )
 
 LEAST_CHUNK = 1.5  # rows of a chunk, on average, over those that pairs reach ahead
+SLICES = 4  # cells along x per cell along y
+WIDER = 1.0 + 1.0e-9  # so that rounding at a cell's border loses no pair
 CELLS_PER_SPHERE = 8  # a coarser grid is used beyond, so that one sphere far away costs no memory
 
 
@@ -80,19 +82,21 @@ def grow_skins(spheres, count, settings):
 
 @njit(cache=True)
 def make_grid(spheres, count, reach):
-    """Cells of at least `reach` (m) around the spheres. Returns (corner (3,), cell size, cells along x, y,
-    z)."""
+    """Cells of at least `reach` (m) around the spheres, finer along x, where a search reads them in one go.
+
+    Returns (corner (3,) m, cell sizes (3,) m, cells along x, y, z).
+    """
     low = np.full(3, np.inf)
     high = np.full(3, -np.inf)
     for i in range(count):
         for a in range(3):
             low[a] = min(low[a], spheres.place[i, a])
             high[a] = max(high[a], spheres.place[i, a])
-    size = reach
+    size = np.array([reach / SLICES, reach, reach])
     cells = np.ones(3, np.int64)
     while True:
         for a in range(3):
-            cells[a] = int(min(math.floor((high[a] - low[a]) / size), 1.0e6)) + 1
+            cells[a] = int(min(math.floor((high[a] - low[a]) / size[a]), 1.0e6)) + 1
         if cells[0] * cells[1] * cells[2] <= CELLS_PER_SPHERE * count + 4096:
             return low, size, cells
         size *= 1.25
@@ -104,9 +108,9 @@ def sort_by_cell(spheres, count, corner, size, cells):
     index = np.empty(count, np.int64)
     first = np.zeros(cells[0] * cells[1] * cells[2] + 1, np.int64)
     for i in range(count):
-        x = int((spheres.place[i, 0] - corner[0]) / size)
-        y = int((spheres.place[i, 1] - corner[1]) / size)
-        z = int((spheres.place[i, 2] - corner[2]) / size)
+        x = int((spheres.place[i, 0] - corner[0]) / size[0])
+        y = int((spheres.place[i, 1] - corner[1]) / size[1])
+        z = int((spheres.place[i, 2] - corner[2]) / size[2])
         index[i] = (z * cells[1] + y) * cells[0] + x
         first[index[i] + 1] += 1
     for c in range(len(first) - 1):
@@ -132,13 +136,16 @@ def sort_by_cell(spheres, count, corner, size, cells):
 def list_pairs(spheres, pairs, count, first, corner, size, cells):
     """Fill the half list. Returns the entries needed; it is whole where these are fewer than the capacity.
 
-    Rows ahead of i in the same and the next cell of its x row, then the four x rows ahead in y and z.
+    Rows ahead of i in its own x row, then those in the four x rows ahead in y and z, as far as a pair of i
+    can reach.
     """
     around = np.empty(PLACE * np.uint64(count))  # position, radius and skin together, flat
+    widest = 0.0
     for i in range(count):
         for a in range(3):
             around[4 * i + a] = spheres.place[i, a]
         around[4 * i + 3] = spheres.place[i, RADIUS] + spheres.anchor[i, SKIN]
+        widest = max(widest, around[4 * i + 3])
     partner, owner = pairs.partner, pairs.owner
     spare = np.uint64(len(partner) - 1)
     nx, ny, nz = cells
@@ -146,17 +153,25 @@ def list_pairs(spheres, pairs, count, first, corner, size, cells):
     for i in range(count):
         pairs.start[i] = min(found, spare)
         x, y, z, own = around[4 * i], around[4 * i + 1], around[4 * i + 2], around[4 * i + 3]
-        cx = int((x - corner[0]) / size)
-        cy = int((y - corner[1]) / size)
-        cz = int((z - corner[2]) / size)
+        most = (own + widest) * WIDER
+        left = int(max(x - most - corner[0], 0.0) / size[0])
+        right = min(int((x + most - corner[0]) / size[0]), nx - 1)
+        cy, cz = int((y - corner[1]) / size[1]), int((z - corner[2]) / size[2])
+        in_y, in_z = y - corner[1] - cy * size[1], z - corner[2] - cz * size[2]  # place within the cell
         for row in range(5):
             ry = cy if row == 0 else (cy + 1 if row == 1 else cy + row - 3)
             rz = cz if row < 2 else cz + 1
             if ry < 0 or ry >= ny or rz >= nz:
                 continue
+            if (
+                (ry > cy and size[1] - in_y > most)
+                or (ry < cy and in_y > most)
+                or (rz > cz and size[2] - in_z > most)
+            ):
+                continue
             line = (rz * ny + ry) * nx
-            begin = i + 1 if row == 0 else first[line + max(cx - 1, 0)]
-            end = first[line + min(cx + 1, nx - 1) + 1]
+            begin = i + 1 if row == 0 else first[line + left]
+            end = first[line + right + 1]
             for j in range(np.uint64(begin), np.uint64(max(begin, end))):
                 k = PLACE * j
                 dx, dy, dz = x - around[k], y - around[k + ONE], z - around[k + TWO]
