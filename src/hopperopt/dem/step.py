@@ -10,6 +10,7 @@ from hopperopt.dem.walls import carry_touches, rebuild_touches
 
 DONE, PAIRS_FULL, TOUCHES_FULL, NOT_FINITE = range(4)
 NOTHING_CARRIED = -1
+FAR = 1.0e9  # m, m/s: what is no number or beyond stops the run before it indexes a cell
 
 
 @njit(cache=True)
@@ -20,7 +21,7 @@ def rebuild(spheres, pairs, touches, walls, chunks, counters, settings):
     """
     for i in range(counters[COUNT]):
         for a in range(3):
-            if not abs(spheres.place[i, a]) < 1.0e9:
+            if not (abs(spheres.place[i, a]) < FAR and abs(spheres.motion[i, a]) < FAR):
                 return NOT_FINITE
     if counters[PAIR_CARRIED] == NOTHING_CARRIED:
         carry_pairs(spheres, pairs, counters)
