@@ -28,6 +28,7 @@ from hopperopt.dem.state import (
     VECTOR,
 )
 
+CHUNK_ROWS = 128  # rows of a chunk, on average, at least
 LEAST_CHUNK = 1.5  # rows of a chunk, on average, over those that pairs reach ahead
 SLICES = 4  # cells along x per cell along y
 WIDER = 1.0 + 1.0e-9  # so that rounding at a cell's border loses no pair
@@ -198,7 +199,7 @@ def divide(spheres, pairs, chunks, counters):
     for k in range(pairs.start[count]):
         ahead = max(ahead, np.int64(pairs.partner[k]) - np.int64(pairs.owner[k]))
     number = 1
-    while 2 * number <= MOST_CHUNKS and count >= 2 * number * LEAST_CHUNK * ahead:
+    while 2 * number <= MOST_CHUNKS and count >= 2 * number * max(LEAST_CHUNK * ahead, CHUNK_ROWS):
         number *= 2
     counters[CHUNKS] = number
     work = count + np.int64(pairs.start[count])
