@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from hopperopt.dem.materials import contact_law
+from hopperopt.dem.state import CHUNKS
 from validation import plain
 
 PARTICLE, WALL = (1.0e7, 0.25), (2.2e7, 0.3)  # shear modulus (Pa), Poisson's ratio
 DENSITY = 2285.0  # kg/m3
 GRAVITY = np.array([20.0, -30.0, -800.0])  # m/s2
-STEPS = 20
 
 
 def heap():
@@ -29,25 +29,27 @@ def heap():
 
 
 def column():
-    """24 spheres winding up a tube: so tall that the solver adds up its contacts in several chunks."""
-    radius, deep, turn, tube = 0.0015, 1.5e-5, 2.6, 0.0025
-    out, angle = tube - radius + deep, turn * np.arange(24)
+    """300 spheres winding up a tube: so many that the solver adds up its contacts in chunks."""
+    count, radius, deep, turn, tube = 300, 0.0015, 1.5e-5, 2.6, 0.0025
+    out, angle = tube - radius + deep, turn * np.arange(count)
     rise = np.sqrt((2.0 * radius - deep) ** 2 - (2.0 * out * np.sin(turn / 2.0)) ** 2)
-    height = radius - deep + rise * np.arange(24)
+    height = radius - deep + rise * np.arange(count)
     centres = np.column_stack([out * np.cos(angle), out * np.sin(angle), height])
-    return {"tube": np.array([[0.0, 0.0], [tube, 0.0], [tube, 0.1]])}, np.full(24, radius), centres
+    return {"tube": np.array([[0.0, 0.0], [tube, 0.0], [tube, 1.0]])}, np.full(count, radius), centres
 
 
 @pytest.mark.parametrize(
-    ("arrange", "rolling", "time_step", "restitution", "friction"),
+    ("arrange", "steps", "rolling", "time_step", "restitution", "friction"),
     [
-        (heap, "edem", 4.0e-5, 0.3, 0.5),
-        (heap, "cdt", 2.0e-5, 0.9, 0.3),
-        (heap, "none", 2.0e-5, 0.0, 3.0),
-        (column, "cdt", 4.0e-5, 0.7, 0.5),
+        (heap, 20, "edem", 4.0e-5, 0.3, 0.5),
+        (heap, 20, "cdt", 2.0e-5, 0.9, 0.3),
+        (heap, 20, "none", 2.0e-5, 0.0, 3.0),
+        (column, 4, "edem", 4.0e-5, 0.7, 0.5),
     ],
 )
-def test_spheres_move_as_in_the_plain_solver(simulate, arrange, rolling, time_step, restitution, friction):
+def test_spheres_move_as_in_the_plain_solver(
+    simulate, arrange, steps, rolling, time_step, restitution, friction
+):
     """Motion, spins and the forces on the walls; contacts stick and slide, begin and end."""
     walls, radius, centres = arrange()
     rng = np.random.default_rng(4)
@@ -63,7 +65,7 @@ def test_spheres_move_as_in_the_plain_solver(simulate, arrange, rolling, time_st
         time_step, GRAVITY, rolling,
     )  # fmt: skip
     contacts, slid = set(), []
-    for _ in range(STEPS):
+    for _ in range(steps):
         sim.advance(1)
         other.step()
         on_walls = np.array([sim.wall_force(name) for name in walls])
@@ -76,3 +78,4 @@ def test_spheres_move_as_in_the_plain_solver(simulate, arrange, rolling, time_st
     for obtained, expected in ((sim.spheres.velocity, other.v), (sim.spheres.spin, other.omega)):
         assert sim.by_identity(obtained) == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
     assert len(contacts) > 2 and 0.1 < np.mean(slid) < 0.95
+    assert arrange is heap or sim.counters[CHUNKS] > 1
