@@ -18,6 +18,7 @@ takes two to four minutes a seed; its runs are kept.
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from hopperopt import config, design, geometry, monitors
 from hopperopt.outflow import GRID, outflow
@@ -97,7 +98,10 @@ def own_run(seed, rolling):
 def bed(run, setting):
     """Height of the bed's top (m), of its centre of mass (m), and its solid fraction, at the opening."""
     position, radius = run["position"].astype(float), run["radius"]
-    level = monitors.filling_level(position, radius, np.full(len(radius), 2), setting)
+    pairs = cKDTree(position).query_pairs(2.0 * radius.max(), output_type="ndarray")
+    gap = np.linalg.norm(position[pairs[:, 0]] - position[pairs[:, 1]], axis=1) - radius[pairs].sum(axis=1)
+    contacts = np.bincount(pairs[gap < 0.0].ravel(), minlength=len(radius))  # a sphere in flight has none
+    level = monitors.filling_level(position, radius, contacts, setting)
     hopper, insert = (np.array(setting["walls"][name]) for name in ("hopper", "insert"))
     room = geometry.volume_inside(hopper, level) - geometry.solid_volume(insert, level)
     solid = 4.0 / 3.0 * np.pi * np.sum(radius**3) / room
