@@ -160,13 +160,12 @@ def draw(loads, path):
             ends[name] = (values[-1], colour)
     axes[0].axhline(math.pi, color=style.INK, linestyle=":")
     axes[0].annotate("stable above", (0.06, math.pi), (0, -3), textcoords="offset points", va="top")
-    for panel, title, ends in zip(
-        axes, ("steps in a tangential period", "$c_t$"), (steps, shares), strict=True
-    ):
+    titles = ("steps of 4e-5 s in a tangential period", "$c_t$ at 4e-5 s")
+    for panel, title, ends in zip(axes, titles, (steps, shares), strict=True):
         panel.set(xscale="log", xlim=(0.05, 100), ylim=(0, None), xlabel="load / mN", ylabel=title)
-        for load, words in zip(loads, ("bed's median", "bed's 99 %"), strict=True):
+        for load, name in zip(loads, ("bed's median", "bed's 99 %"), strict=True):
             panel.axvline(1000 * load, color=style.FAINT, linewidth=0.6, zorder=0)
-            panel.annotate(words, (1000 * load, 1), (0, 2), textcoords="offset points", ha="center",
+            panel.annotate(name, (1000 * load, 1), (0, 2), textcoords="offset points", ha="center",
                            xycoords=("data", "axes fraction"))  # fmt: skip
         labels.at_ends(panel, ends)
     style.save(page, [path], 150)
