@@ -126,7 +126,7 @@ def springs_of(sim, plain):
         place = i, plain.surfaces.owner[s]
         met[place] = met.get(place, -1) + 1  # a sphere in a corner touches several surfaces of one wall
         xi_wall.append(walls.pop((*place, met[place]), none))
-    xi, xi_wall = np.array(xi), np.array(xi_wall)
+    xi, xi_wall = np.reshape(xi, (-1, 3)), np.reshape(xi_wall, (-1, 3))
     return xi, xi_wall, len(pairs) + len(walls) + sum(np.isnan(a[:, 0]).sum() for a in (xi, xi_wall))
 
 
