@@ -2,7 +2,7 @@
 
 Beds of the study's spheres in a flat-bottomed cylinder about as wide as it is high, all made the same way:
 tiles cut from the core of one poured bed, those that overlap across the joints taken out, at rest again after
-0.3 s. Each size runs in a process of its own. `--threads 1 2` times each bed on so many threads in turn.
+0.2 s. Each size runs in a process of its own. `--threads 1 2` times each bed on so many threads in turn.
 """
 
 import argparse
@@ -35,7 +35,7 @@ STEP = 4.0e-5
 SAMPLE = Path(__file__).resolve().parent / ".bed.npz"  # the poured bed that tiles are cut from
 TILE = np.array([0.05, 0.05, 0.045])  # m
 TOUCH = 0.98  # of the sum of two radii: what comes closer at a joint is taken out
-RELAXING = 7500  # steps
+RELAXING = 5000  # steps
 
 
 def cylinder(position, radius, width, height, threads=1):

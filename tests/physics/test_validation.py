@@ -1,14 +1,13 @@
 """The quick cases of the validation hold: every judged row of the table that they write."""
 
 import importlib
-import importlib.util
 
 import pytest
 
 from validation.__main__ import QUICK
 
 
-@pytest.mark.parametrize("case", [c for c in QUICK if importlib.util.find_spec(f"validation.{c}")])
+@pytest.mark.parametrize("case", QUICK)
 def test_every_row_holds(case):
     rows = importlib.import_module(f"validation.{case}").measure(None)
     assert [row for row in rows if row.tolerance and not row.holds] == []
