@@ -14,6 +14,7 @@ import sys
 import time
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 os.environ.setdefault("NUMBA_NUM_THREADS", str(os.cpu_count()))
 
 from hopperopt import provenance
@@ -23,15 +24,11 @@ provenance.use_numba_cache()
 import numpy as np  # noqa: E402
 from scipy.spatial import cKDTree  # noqa: E402
 
-from hopperopt.dem.materials import contact_law  # noqa: E402
 from hopperopt.dem.simulation import Simulation  # noqa: E402
 from hopperopt.packing import scatter  # noqa: E402
+from validation.setups import DENSITY, TIME_STEP, pair_law, wall_law  # noqa: E402
 
-PARTICLE, PLEXIGLASS = (1.0e7, 0.25), (2.2e7, 0.25)  # shear modulus (Pa), Poisson's ratio
-PAIR = contact_law(PARTICLE, PARTICLE, 0.7, 0.5, 0.05)
-WALL = contact_law(PARTICLE, PLEXIGLASS, 0.2, 0.5, 0.25)
 RADII = np.array([1.0e-3, 1.5e-3, 2.0e-3])
-STEP = 4.0e-5
 SAMPLE = Path(__file__).resolve().parent / ".bed.npz"  # the poured bed that tiles are cut from
 TILE = np.array([0.05, 0.05, 0.045])  # m
 TOUCH = 0.98  # of the sum of two radii: what comes closer at a joint is taken out
@@ -42,7 +39,9 @@ def cylinder(position, radius, width, height, threads=1):
     """A simulation of spheres at rest in a cylinder of radius `width` (m) with a flat floor."""
     walls = {"cylinder": [[0.0, 0.0], [width, 0.0], [width, height]]}
     still = np.zeros_like(position)
-    return Simulation(position, still, radius, 2285.0, walls, PAIR, WALL, STEP, threads=threads)
+    return Simulation(
+        position, still, radius, DENSITY, walls, pair_law(), wall_law(), TIME_STEP, threads=threads
+    )
 
 
 def poured():

@@ -12,12 +12,10 @@ import numpy as np
 
 from hopperopt.dem.materials import contact_law
 from hopperopt.dem.simulation import Simulation
+from validation.setups import DENSITY, PARTICLE, PLEXIGLASS, TIME_STEP
 
 POURED = Path(__file__).with_suffix(".csv")
 COUNT = 240
-DENSITY = 2285.0  # kg/m3
-TIME_STEP = 4.0e-5  # s
-PARTICLE, PLEXIGLASS = (1.0e7, 0.25), (2.2e7, 0.25)  # shear modulus (Pa), Poisson's ratio
 PAIR, WALL = (0.7, 0.5, 0.05), (0.2, 0.5, 0.25)  # restitution, friction, rolling friction
 GRAVITY = np.array([15.0, -10.0, -150.0])  # m/s2
 WALLS = {
