@@ -25,7 +25,7 @@ import numpy as np
 
 from hopperopt.dem.simulation import Simulation
 from validation.contact_ode import Impact, rebound
-from validation.report import Row, at_most
+from validation.report import Row, at_most, save_plain
 from validation.setups import (
     DENSITY,
     GRAVITY,
@@ -181,8 +181,4 @@ def draw(folder, coarse, errors):
     two.minorticks_off()
     two.set_xlabel("time step (µs)")
     two.set_ylabel("energy error of the gas, rms")
-    for axes in (one, two):
-        axes.grid(color="0.93")
-        axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(folder / "energy.png", dpi=150)
-    plt.close(figure)
+    save_plain(figure, folder / "energy.png")

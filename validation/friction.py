@@ -16,7 +16,7 @@ creep.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from validation.report import Row, at_most
+from validation.report import Row, at_most, save_plain
 from validation.setups import GRAVITY, TIME_STEP, on_floor, sphere_mass, wall_law
 
 RADII = np.array([0.001, 0.0015, 0.002])  # m
@@ -175,8 +175,4 @@ def draw(folder, tracks):
     two.text(0.63, 0.05, "line: closed form", transform=two.transAxes, color="0.4", ha="right")
     two.set_xlabel(r"slope tan α ($\mu_s = 0.5$, $\mu_r = 0.25$, 4·10⁻⁵ s)")
     two.set_ylabel("acceleration over g")
-    for axes in (one, two):
-        axes.grid(color="0.93")
-        axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(folder / "friction.png", dpi=150)
-    plt.close(figure)
+    save_plain(figure, folder / "friction.png")

@@ -16,7 +16,7 @@ solver has the weight act on through the contact.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from validation.report import at_most, within
+from validation.report import at_most, save_plain, within
 from validation.setups import (
     GRAVITY,
     TIME_STEP,
@@ -152,8 +152,4 @@ def draw(folder, curves, tracks):
     two.set_xlabel("time (s)")
     two.set_ylabel("height above the floor (mm)")
     two.text(0.98, 0.97, "numbers: e\ncircles: closed form", transform=two.transAxes, ha="right", va="top")
-    for axes in (one, two):
-        axes.grid(color="0.9")
-        axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(folder / "impact.png", dpi=150)
-    plt.close(figure)
+    save_plain(figure, folder / "impact.png")

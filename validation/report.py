@@ -50,6 +50,17 @@ def at_most(test, limit, obtained, unit=""):
                bool(obtained <= limit))  # fmt: skip
 
 
+def save_plain(figure, path):
+    """Save a matplotlib figure with a faint grid and without frames around its axes, and close it."""
+    import matplotlib.pyplot as plt
+
+    for axes in figure.axes:
+        axes.grid(color="0.93")
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.savefig(path, dpi=150)
+    plt.close(figure)
+
+
 def keep(name, title, text, rows, seconds, figures):
     """Store a case's result, for the page."""
     STORE.mkdir(parents=True, exist_ok=True)
