@@ -1,6 +1,7 @@
 # make                     the locked environment in .venv, then the full study
 # make setup               the environment alone
 # make test, make lint     in the same environment: the tests; style and the boundaries between modules
+# make test-all            the tests with the full counts: hours
 # make validation         the solver against closed forms and other codes: rewrites docs/validation.md; CASE=name for one
 # make lock                the newest versions of all libraries into requirements.lock
 # make PYTHON=python3.12   another Python for the environment;   make CORES=4   fewer cores for the study
@@ -11,7 +12,7 @@ install := .venv/bin/python -m pip install -qq --disable-pip-version-check --no-
 suitable := import ensurepip, sys, venv; sys.exit(sys.implementation.name != "cpython" or not (3, 11) <= sys.version_info < (3, 15))
 version = $(shell $(1) -c 'import sys; print(sys.version)' 2>/dev/null)
 
-.PHONY: study setup test lint validation lock
+.PHONY: study setup test test-all lint validation lock
 study: setup
 	.venv/bin/snakemake --cores $(CORES)
 
@@ -19,6 +20,9 @@ setup: $(stamp)
 
 test: setup
 	.venv/bin/python -m pytest
+
+test-all: setup
+	.venv/bin/python -m pytest -m "full or not full"
 
 validation: setup
 	.venv/bin/python -m validation $(CASE)
