@@ -5,16 +5,24 @@ A stage's command gets its configuration as one JSON string and its files as opt
 """
 
 import argparse
+import errno
 import importlib
 import json
 import logging
+import math
+import signal
 import sys
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
+import yaml
+
 from hopperopt import provenance
-from hopperopt.document import ConfigError, lookup
+from hopperopt.document import ConfigError, NotAllowed, lookup
+from hopperopt.quantity import Quantity
 
 BAD_INPUT = 2
 MOST_SEED = 2**63 - 1
@@ -68,11 +76,12 @@ FIGURES = {
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return the exit status: 0, or 2 for input that cannot be used (said in one sentence)."""
     logging.basicConfig(level=logging.INFO, format="%(levelname)s: %(message)s", stream=sys.stderr)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     given = _parser().parse_args(arguments)
     try:
         given.action(given)
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+        print("interrupted; the same command, or `make resume`, goes on", file=sys.stderr)
         return 130
     except (ConfigError, OSError, json.JSONDecodeError) as error:
         return _refused(error)
@@ -87,10 +96,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _refused(error: Exception) -> int:
+    text = str(error)
     if isinstance(error, OSError) and error.filename is not None:
-        error = f"{error.filename}: {error.strerror}"
-    print(f"hopperopt: {error}", file=sys.stderr)
+        text = f"{error.filename}: {error.strerror}"
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            text += "; free some space, then the same command, or `make resume`, goes on"
+    with suppress(OSError):  # where the log's disk is full, the exit status must do
+        print(f"hopperopt: {text}", file=sys.stderr)
     return BAD_INPUT
+
+
+def _log_heading(settings: Mapping) -> None:
+    """What a log begins with: versions, place, and the settings of the job."""
+    made_by = provenance.attributes()
+    versions = ", ".join(f"{name} {number}" for name, number in json.loads(made_by["versions"]).items())
+    logging.info(f"hopperopt {made_by['hopperopt_version']} (git {made_by['git']}) on {made_by['host']}")
+    logging.info(f"{versions}")
+    text = yaml.safe_dump(settings, sort_keys=False, default_flow_style=None, width=100, allow_unicode=True)
+    logging.info("settings:\n" + textwrap.indent(text.rstrip(), "    "))
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -138,8 +161,16 @@ def _threads(text: str) -> int:
     return int(text)
 
 
+def _minutes(text: str) -> float:
+    try:
+        return math.inf if text == "null" else Quantity(above=0).read(text)
+    except NotAllowed as allowed:
+        raise argparse.ArgumentTypeError(f"{text} is not allowed; allowed: {allowed} or null") from None
+
+
 def _run_stage(given: argparse.Namespace) -> None:
     """Call the stage's function with its parameters, inputs and outputs."""
+    _log_heading(given.params)
     inputs = [getattr(given, option.rstrip("*")) for option in given.stage.inputs]
     from hopperopt import files
 
@@ -172,6 +203,18 @@ def _add_simulate(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--threads", type=_threads, metavar="N", help="threads to work with (default: the configuration's)"
     )
+    command.add_argument(
+        "--checkpoint-minutes",
+        type=_minutes,
+        metavar="N",
+        help="how often the state is saved, null: never (default: the configuration's)",
+    )
+    command.add_argument(
+        "--state-dir",
+        type=Path,
+        metavar="DIR",
+        help="where the state is saved (default: .state in the study's folder of results)",
+    )
     command.add_argument("--case", type=_json, metavar="JSON", help=argparse.SUPPRESS)
     command.add_argument("--design", nargs="*", default=[], metavar="YAML", help=argparse.SUPPRESS)
     command.add_argument("--output", type=Path, required=True, metavar="FILE", help="netCDF file to write")
@@ -179,42 +222,37 @@ def _add_simulate(command: argparse.ArgumentParser) -> None:
 
 
 def _simulate(given: argparse.Namespace) -> None:
-    """Run one simulation and write its file, with all that says how it was made."""
-    case, threads = _case(given)
-    threads = given.threads or threads
+    """Run one simulation and write its file."""
+    case, running = _case(given)
+    chosen = {name: getattr(given, name) for name in running._fields if getattr(given, name) is not None}
     # The workflow's digest only makes Snakemake run this anew; what is recorded is the code that runs.
     case.pop("code", None)
-    given.output.parent.mkdir(parents=True, exist_ok=True)
-    provenance.compile_solver(threads)
-    from hopperopt import dataset, experiment, files
-    from hopperopt.progress import Reporter
+    _log_heading(case)
+    digest = provenance.code_digest(f"hopperopt.{SIMULATION}")
+    from hopperopt.simulate import simulate
 
-    with Reporter(sys.stderr) as progress:
-        run = experiment.run(case, progress=progress, threads=threads)
-    run.attrs |= provenance.attributes() | {
-        "case": json.dumps(case, sort_keys=True),
-        "code_digest": provenance.code_digest(f"hopperopt.{SIMULATION}"),
-        "seed": case["seed"],
-    }
-    files.write_netcdf(run, given.output)
-    level, reached = 1e3 * case["filling"]["level"], 1e3 * float(run["filling_level"])
-    if abs(reached - level) > 1e3 * max(case["particles"]["diameters"]):
-        logging.warning(
-            f"the bed was {reached:.1f} mm high, not {level:g} mm (give or take a coarse particle)"
-        )
-    print(f"{given.output}: {dataset.outcome(run)}", file=sys.stderr)
+    simulate(case, digest, given.output, **running._replace(**chosen)._asdict())
 
 
-def _case(given: argparse.Namespace) -> tuple[dict, int]:
-    """The case to simulate (the workflow's, that of a design the study found, one by hand); threads."""
+class Running(NamedTuple):
+    """How a simulation is run, which changes no bit of its result."""
+
+    threads: int = 1
+    checkpoint_minutes: float | None = None
+    state_dir: Path = Path(".state")
+
+
+def _case(given: argparse.Namespace) -> tuple[dict, Running]:
+    """The case to simulate (the workflow's, that of a design the study found, one by hand), and how."""
     if given.case is not None and not given.design:
-        return given.case, 1
+        return given.case, Running()
     from hopperopt import config
 
     if given.case is not None:
         from hopperopt import files
 
-        return config.derived_case(given.case, files.read_yaml(given.design[0])["design"]), 1
+        design = files.read_yaml(given.design[0])["design"]
+        return config.derived_case(given.case, design), Running()
     study = config.parse(config.load(given.configfile), Path.cwd())
     typed = _typed_factors(given)
     if given.no_insert:
@@ -223,7 +261,9 @@ def _case(given: argparse.Namespace) -> tuple[dict, int]:
         case = study.simulation_case(None, "by_hand", 1)
     else:
         case = config.derived_case(study.derived_params("by_hand", 1), _design(study, typed))
-    return case if given.seed is None else case | {"seed": given.seed}, study.simulation.threads
+    settings = study.simulation
+    running = Running(settings.threads, settings.checkpoint_minutes, Path(study.state_dir))
+    return case if given.seed is None else case | {"seed": given.seed}, running
 
 
 def _typed_factors(given: argparse.Namespace) -> dict[str, str]:

@@ -227,11 +227,12 @@ class Discharge(Model):
 
 
 class Simulation(Model):
-    """Time step (`auto`: a fifth of the Rayleigh time), gravity, and the threads of one run."""
+    """Time step (`auto`: a fifth of the Rayleigh time), gravity; threads and checkpoints of one run."""
 
     time_step_s: Annotated[float | Literal["auto"], Number(above=0)] = 4.0e-5
     gravity_m_s2: Annotated[float, Number(above=0, most=1000)] = 9.81
     threads: Annotated[int, Number(least=1, most=1024)] = 1
+    checkpoint_minutes: Annotated[float | None, Number(above=0, most=100_000)] = 5.0
 
 
 class Setup(Model):
@@ -429,6 +430,11 @@ class Study(Setup):
     _own_plan: list = PrivateAttr(default_factory=list)
 
     @property
+    def state_dir(self):
+        """Where the states of unfinished simulations are kept."""
+        return f"{self.results_dir}/.state"
+
+    @property
     def levels(self):
         """The levels of each factor, by name."""
         return {name: factor.levels for name, factor in self.factors.items()}
@@ -483,6 +489,8 @@ class Study(Setup):
         used = ("shape", "height_mm", self.insert.shape)
         setup["insert"] = {key: value for key, value in setup["insert"].items() if key in used}
         setup["discharge"].pop("incomplete")
+        for unused in ("threads", "checkpoint_minutes"):
+            setup["simulation"].pop(unused)
         keys = {name: factor.key for name, factor in self.factors.items()}
         return {"setup": setup, "keys": keys, "seed": run_seed(self.seed, name, replicate)}
 

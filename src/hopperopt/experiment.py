@@ -3,12 +3,14 @@
 A case is a plain dict in SI units (`config.Study.simulation_case` makes it).
 """
 
+import logging
 import time
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
+from hopperopt.dem import checkpoint as solver
 from hopperopt.dem.materials import contact_law
 from hopperopt.dem.simulation import NotFinite, Simulation
 from hopperopt.monitors import EnergyWatch, Envelope, FlowPattern, filling_level
@@ -24,6 +26,12 @@ PROGRESS_TIME = 1.0  # s between two reports
 # What the monitors may reach in a run that counts.
 MAX_OVERLAP, MAX_SPEED_RATIO, MAX_ENERGY_GAIN = 0.3, 2.0, 0.01
 CLASSES = 3
+# Every field of an experiment, beside those of its simulation, that the run changes.
+EVOLVING = (
+    "envelope.outside", "energy.least", "energy.gain", "flow.sums", "flow.counts", "flow.samples", "heights",
+    "filling_time", "level", "settled", "finite", "position_opening", "position_half", "particle_steps",
+    "step_count", "wall_time",
+)  # fmt: skip
 
 
 @dataclass
@@ -37,15 +45,17 @@ class Progress:
     remaining: float | None  # s of wall time to go, where it can be told
 
 
-def run(case, progress=None, threads=1):
+def run(case, progress=None, threads=1, checkpoint=None):
     """Simulate one experiment.
 
     Arguments: the case; `progress`, called with a `Progress` about once a second; `threads` to work with,
-    which change no bit of what is simulated. Returns the run's data set: exit times, diameters, size classes
-    and two sets of positions by particle, and scalars (see `dataset`). A run that jams, ends at a limit or
-    breaks a monitor returns as well: its `status` says so.
+    which change no bit of what is simulated; `checkpoint`, which keeps the state of the run (arrays by name):
+    `load()` returns what it has kept of this case or None, `due()` tells whether to `save(state)`. Nor does
+    saving change a bit, or going on from a saved state. Returns the run's data set: exit times, diameters,
+    size classes and two sets of positions by particle, and scalars (see `dataset`). A run that jams, ends at
+    a limit or breaks a monitor returns as well: its `status` says so.
     """
-    return _Experiment(case, progress, threads).run()
+    return _Experiment(case, progress, threads, checkpoint).run()
 
 
 def build(case, threads=1):
@@ -79,9 +89,10 @@ def build(case, threads=1):
 class _Experiment:
     """The state of one run beyond the solver's: what has been observed so far."""
 
-    def __init__(self, case, progress, threads):
+    def __init__(self, case, progress, threads, checkpoint):
         self.case = case
         self.progress = progress
+        self.checkpoint = checkpoint
         self.simulation = build(case, threads)
         spheres = self.simulation.spheres
         order = np.argsort(spheres.identity)
@@ -93,28 +104,52 @@ class _Experiment:
         self.flow = FlowPattern(case)
         self.energy = EnergyWatch(self.simulation.energy())
         self.particle_steps, self.step_count = 0, 0
-        self.begun = self.reported = time.monotonic()
+        self.wall_time = 0.0  # s up to `clock`, which is read at every sample
+        self.clock = self.reported = time.monotonic()
         nowhere = np.full((len(self.mass), 3), np.nan)
         self.position_opening, self.position_half = nowhere, nowhere
+        self.heights = [self.height()]  # of the centre of mass at every sample of the filling, m
         self.level = self.filling_time = np.nan
         self.settled = self.finite = True
 
     def run(self):
-        """Fill, open, discharge; return the data set."""
+        """Fill, open, discharge, or what is left of it after a checkpoint; return the data set."""
+        if self.checkpoint is not None and (state := self.checkpoint.load()) is not None:
+            self.restore(state)
         try:
-            self.fill()
+            if np.isnan(self.filling_time):
+                self.fill()
+                self.simulation.open("gate", self.case["discharge"]["sensor"])
             self.discharge()
         except NotFinite:
             self.finite = False
         return self.dataset()
 
+    def state(self):
+        """All that the rest of the run depends on, arrays by name (no copies)."""
+        return solver.read(self, EVOLVING) | solver.read(self.simulation, solver.EVOLVING)
+
+    def restore(self, state):
+        """Go on from a state of a run of the same case."""
+        solver.restore(self.simulation, state)
+        solver.write(self, EVOLVING, state)
+        stage = "filling" if np.isnan(self.filling_time) else "discharge"
+        logging.info(
+            f"resumed from a checkpoint at {self.simulation.time:.3f} s of the {stage}, "
+            f"{self.simulation.count} particles left"
+        )
+
     def advance(self, stage):
-        """Run up to the next sample and report."""
+        """Run up to the next sample and report; the state before is what a checkpoint keeps."""
+        if self.checkpoint is not None and self.checkpoint.due():
+            self.checkpoint.save(self.state())
         rows, begun = self.simulation.rows, time.monotonic()
         self.simulation.advance(self.sample_steps)
         self.step_count += self.sample_steps
         self.particle_steps += rows * self.sample_steps
         now = time.monotonic()
+        self.wall_time += now - self.clock
+        self.clock = now
         if self.progress is not None and now - self.reported >= PROGRESS_TIME:
             self.reported = now
             rate = rows * self.sample_steps / max(now - begun, 1e-9)
@@ -143,13 +178,12 @@ class _Experiment:
     def fill(self):
         """Rain and settle, until the bed is at rest or the time is over."""
         limit = self.case["filling"]["settling_limit"]
-        heights = [self.height()]
-        while not self.at_rest(heights):
+        while not self.at_rest():
             if self.simulation.time >= limit:
                 self.settled = False
                 break
             self.advance("settling" if self.simulation.time > 0.2 else "filling")
-            heights.append(self.height())
+            self.heights.append(self.height())
             self.energy.sample(self.simulation.energy())
             self.envelope.sample(self.positions(), gate_closed=True)
         self.filling_time = self.simulation.time
@@ -161,20 +195,19 @@ class _Experiment:
         """Height of the centre of mass, m."""
         return float(self.mass @ self.positions()[:, 2] / self.mass.sum())
 
-    def at_rest(self, heights):
+    def at_rest(self):
         """Whether the kinetic energy is spent and the centre of mass has come to rest."""
         back = max(1, round(SETTLED_TIME / (self.sample_steps * self.case["time_step"])))
-        if len(heights) <= back:
+        if len(self.heights) <= back:
             return False
         kinetic = self.simulation.energy()[0] / len(self.mass)
         quiet = kinetic < SETTLED_ENERGY * self.mass.mean() * self.case["gravity"] * self.diameter.mean()
-        return quiet and heights[-1 - back] - heights[-1] < SETTLED_SINKING * self.diameter.max()
+        sunk = self.heights[-1 - back] - self.heights[-1]
+        return quiet and sunk < SETTLED_SINKING * self.diameter.max()
 
     def discharge(self):
-        """Open the gate and run until the hopper is empty, idle or out of time."""
-        limits = self.case["discharge"]
-        simulation = self.simulation
-        simulation.open("gate", limits["sensor"])
+        """Run with the gate open until the hopper is empty, idle or out of time."""
+        limits, simulation = self.case["discharge"], self.simulation
         while simulation.count and simulation.time < limits["time_limit"]:
             last = np.nanmax(simulation.exit_time, initial=0.0)
             if simulation.time - last >= limits["idle_limit"]:
@@ -218,7 +251,7 @@ class _Experiment:
     def dataset(self):
         """The run's data set, schema in `SCALARS` and `PARTICLES`."""
         simulation = self.simulation
-        seconds = time.monotonic() - self.begun
+        seconds = self.wall_time + time.monotonic() - self.clock
         left = np.isnan(simulation.exit_time)
         values = {
             "particle_count": len(self.mass),

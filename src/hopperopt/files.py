@@ -4,6 +4,7 @@ Every file appears under its name only when it is whole: it is written beside it
 and then renamed, so that an interrupted job leaves either the old file or none.
 """
 
+import glob
 import os
 import secrets
 from collections.abc import Iterator, Mapping
@@ -38,20 +39,38 @@ def stamped(attributes: Mapping[str, str]) -> Iterator[None]:
 def atomic(path: str | os.PathLike) -> Iterator[Path]:
     """Give a temporary path beside `path` (same suffix); what was written there takes its place at the end.
 
-    The folder of `path` is made. After an exception the temporary file is removed and `path` is as it was.
+    The folder of `path` is made. After an exception the temporary file is removed and `path` is as it was; an
+    OSError names `path`.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{secrets.token_hex(4)}.{path.name}")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
+        with temporary.open("rb") as file:
+            os.fsync(file.fileno())
         temporary.replace(path)
+    except OSError as error:
+        if error.filename in (None, temporary, str(temporary)):
+            raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 
 
+def remove_leftovers(path: str | os.PathLike) -> None:
+    """Remove what writers of `path` that were killed have left. Only for who knows that nobody writes it."""
+    path = Path(path)
+    for temporary in path.parent.glob(f".????????.{glob.escape(path.name)}"):
+        temporary.unlink()
+
+
 def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike) -> None:
-    """Write a dataset as netCDF-4, arrays of numbers compressed, coordinates without a fill value."""
+    """Write a dataset as netCDF-4, arrays of numbers compressed, coordinates without a fill value.
+
+    The file is made in memory: then what goes wrong in writing it, such as a full disk, is an OSError that
+    says so.
+    """
     encoding = {}
     for name, variable in dataset.variables.items():
         numeric = variable.dtype.kind in "fiub"
@@ -60,10 +79,11 @@ def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         )
         if variable.dtype.kind == "f" and name in dataset.coords:
             encoding[name]["_FillValue"] = None
+    content = dataset.assign_attrs(_stamp.get()).to_netcdf(
+        engine="netcdf4", format="NETCDF4", encoding=encoding
+    )
     with atomic(path) as temporary:
-        dataset.assign_attrs(_stamp.get()).to_netcdf(
-            temporary, engine="netcdf4", format="NETCDF4", encoding=encoding
-        )
+        temporary.write_bytes(content)
 
 
 def read_netcdf(path: str | os.PathLike) -> xr.Dataset:

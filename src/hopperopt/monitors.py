@@ -15,7 +15,7 @@ class EnergyWatch:
 
     def __init__(self, energies):
         kinetic, self._potential, elastic = energies
-        self._least = kinetic + self._potential + elastic
+        self.least = kinetic + self._potential + elastic
         self.gain = 0.0
 
     def sample(self, energies):
@@ -23,9 +23,9 @@ class EnergyWatch:
         kinetic, potential, elastic = energies
         total = kinetic + potential + elastic
         released = self._potential - potential
-        if total > self._least and released > 0.0:
-            self.gain = max(self.gain, (total - self._least) / released)
-        self._least = min(self._least, total)
+        if total > self.least and released > 0.0:
+            self.gain = max(self.gain, (total - self.least) / released)
+        self.least = min(self.least, total)
 
 
 class Envelope:
@@ -33,7 +33,7 @@ class Envelope:
 
     def __init__(self, profile, count):
         self._r, self._z = np.asarray(profile, dtype=float).T
-        self._outside = np.zeros(count, dtype=bool)
+        self.outside = np.zeros(count, dtype=bool)
 
     def sample(self, position, gate_closed):
         """Look at positions (n, 3) by identity, m; NaN rows (spheres that left) are passed over.
@@ -43,12 +43,12 @@ class Envelope:
         r, z = np.hypot(position[:, 0], position[:, 1]), position[:, 2]
         beside = (r > np.interp(z, self._z, self._r)) & (z >= self._z[0])
         below = (z < self._z[0]) if gate_closed else False
-        self._outside |= beside | (z > self._z[-1]) | below
+        self.outside |= beside | (z > self._z[-1]) | below
 
     @property
     def lost(self):
         """Spheres seen outside so far."""
-        return int(np.count_nonzero(self._outside))
+        return int(np.count_nonzero(self.outside))
 
 
 def radius_at(profile, z):
@@ -75,7 +75,7 @@ class FlowPattern:
         insert = case["walls"]["insert"]
         self._insert = insert if insert and min(r for r, _ in insert) == 0.0 else None  # not a ring
         self._wall_radius = case["walls"]["hopper"][-1][0]
-        self._sums, self._counts, self._samples = np.zeros(2), np.zeros(2), 0
+        self.sums, self.counts, self.samples = np.zeros(2), np.zeros(2), 0
 
     def sample(self, position, velocity, share):
         """Take positions and velocities (n, 3) at a discharged mass fraction; NaN rows are passed over."""
@@ -87,16 +87,16 @@ class FlowPattern:
         near_wall = r > self._wall_radius - self._coarse
         near_axis = r - radius_at(self._insert, z) < 2.0 * self._coarse
         for k, region in enumerate((near_wall, near_axis)):
-            self._sums[k] += down[region].sum()
-            self._counts[k] += np.count_nonzero(region)
-        self._samples += 1
+            self.sums[k] += down[region].sum()
+            self.counts[k] += np.count_nonzero(region)
+        self.samples += 1
 
     @property
     def index(self):
         """The index; NaN with fewer than 20 spheres per sample in either region."""
-        if not self._samples or self._counts.min() < MIN_SPHERES * self._samples:
+        if not self.samples or self.counts.min() < MIN_SPHERES * self.samples:
             return np.nan
-        wall, axis = self._sums / self._counts
+        wall, axis = self.sums / self.counts
         return float(wall / axis) if axis else np.nan
 
 

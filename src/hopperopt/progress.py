@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TextIO
 
 LOG_INTERVAL = 10.0  # s
@@ -22,15 +23,18 @@ class Reporter:
         self._open_line = False
 
     def __call__(self, report) -> None:
-        """Show a report; in a log, only at a new stage and every ten seconds."""
-        if self._live:
-            self._stream.write(f"\r\x1b[2K{line(report)}")
-            self._open_line = True
-        elif report.stage != self._stage or self._clock() >= self._due:
-            self._stream.write(f"{line(report)}\n")
-            self._due = self._clock() + LOG_INTERVAL
-        self._stage = report.stage
-        self._stream.flush()
+        """Show a report; in a log, only at a new stage and every ten seconds.
+
+        A log that cannot be written, on a full disk, stops no simulation.
+        """
+        with suppress(OSError):
+            if self._live:
+                self._open_line = True
+                self._stream.write(f"\r\x1b[2K{line(report)}")
+            elif report.stage != self._stage or self._clock() >= self._due:
+                self._stage, self._due = report.stage, self._clock() + LOG_INTERVAL
+                self._stream.write(f"{line(report)}\n")
+            self._stream.flush()
 
     def __enter__(self) -> "Reporter":
         return self

@@ -4,7 +4,6 @@ Digests decide what must be computed anew; git, versions and host are only recor
 """
 
 import ast
-import fcntl
 import functools
 import hashlib
 import json
@@ -14,10 +13,12 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
+
+from hopperopt import locks
 
 PACKAGE = Path(__file__).resolve().parent
 LIBRARIES = ("numpy", "numba", "scipy", "pandas", "xarray", "netCDF4", "scikit-learn", "pymoo", "snakemake")
@@ -166,9 +167,7 @@ def numba_cache_lock() -> Iterator[None]:
 
     The lock ends with the process that holds it. A file system without locks is used without.
     """
-    with (use_numba_cache() / "lock").open("w") as lock:
-        with suppress(OSError):
-            fcntl.flock(lock, fcntl.LOCK_EX)
+    with locks.exclusive(use_numba_cache() / "lock"):
         yield
 
 

@@ -2,7 +2,9 @@
 
 import json
 
+import numpy as np
 import pytest
+import yaml
 
 from hopperopt import cli, experiment, files, provenance
 
@@ -12,9 +14,13 @@ def simulated(monkeypatch, tmp_path, make_run):
     """Function that runs `simulate` with a solver that only writes down its case; returns case and file."""
     cases, used = [], []
 
-    def run(case, progress=None, threads=1):
+    def run(case, progress=None, threads=1, checkpoint=None):
         cases.append(case)
         used.append(threads)
+        if stop := simulate.stops.pop() if simulate.stops else None:
+            checkpoint.save({"counters": np.arange(3)})
+            raise stop
+        simulate.found.append(checkpoint.load())
         return make_run(status="jammed", stayed=20, filling_level=0.060).assign_attrs(wall_time_s=1.0)
 
     monkeypatch.setattr(experiment, "run", run)
@@ -26,8 +32,49 @@ def simulated(monkeypatch, tmp_path, make_run):
         assert cli.main(["simulate", *options, "--output", "out/run.nc"]) == 0
         return cases[-1], files.read_netcdf(tmp_path / "out" / "run.nc")
 
-    simulate.threads = used
+    simulate.threads, simulate.stops, simulate.found = used, [], []
     return simulate
+
+
+def test_an_interrupted_simulation_leaves_its_state_to_the_next(simulated, tmp_path, capsys):
+    """In the study's folder of results or where it is told; another seed does not use it."""
+    for options, folder in ([], "results/.state"), (["--state-dir", "elsewhere"], "elsewhere"):
+        simulated.stops.append(KeyboardInterrupt())
+        assert cli.main(["simulate", "--seed", "1", *options, "--output", "out/run.nc"]) == 130
+        assert "the same command, or `make resume`, goes on" in capsys.readouterr().err
+        assert [path.suffix for path in sorted((tmp_path / folder).iterdir())] == [".lock", ".npz"]
+        simulated("--seed", "1", "--threads", "2", "--checkpoint-minutes", "null", *options)
+        assert simulated.found[-1]["counters"].tolist() == [0, 1, 2]
+        assert not (tmp_path / folder).exists()
+    simulated.stops.append(KeyboardInterrupt())
+    assert cli.main(["simulate", "--seed", "1", "--output", "out/run.nc"]) == 130
+    simulated("--seed", "2")
+    assert simulated.found[-1] is None
+    with pytest.raises(SystemExit):
+        simulated("--checkpoint-minutes", "0")
+    assert "0 is not allowed; allowed: a number above 0 or null" in capsys.readouterr().err
+
+
+def test_the_log_begins_with_versions_and_the_resolved_case(simulated, caplog):
+    caplog.set_level("INFO")
+    case, _ = simulated("--theta", "57.5")
+    heading, settings = caplog.text.split("settings:\n")
+    assert "hopperopt" in heading and "numpy" in heading
+    text = settings.partition("WARNING")[0]
+    assert yaml.safe_load(text)["walls"] == case["walls"]
+    assert caplog.text.count("settings:\n") == 1
+
+
+def test_a_full_disk_is_a_sentence_with_what_to_do(simulated, monkeypatch, capsys, tmp_path):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(files.os, "fsync", full)
+    assert cli.main(["simulate", "--no-insert", "--output", "out/run.nc"]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.startswith("hopperopt: out/run.nc: No space left on device; free some space, then ")
+    assert "make resume" in said
+    assert list((tmp_path / "out").iterdir()) == []
 
 
 def test_threads_are_the_configurations_unless_typed(simulated, tmp_path, capsys):

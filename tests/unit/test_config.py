@@ -537,6 +537,8 @@ def test_bare_hopper_has_nothing_of_an_insert():
         ("verification.replicates", 3),
         ("design.replicates", 3),
         ("discharge.incomplete", "drop"),
+        ("simulation.threads", 2),
+        ("simulation.checkpoint_minutes", None),
         ("insert.profile.file", "unused.csv"),
         ("insert.height_mm", 30),
         ("factors.theta_deg.levels", [61, 57.5, 55, 52.5, 50]),

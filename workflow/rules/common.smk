@@ -27,6 +27,9 @@ DESIGNS = dict(STUDY.experiments())
 EXPERIMENTS = list(DESIGNS)
 REPLICATES = range(1, STUDY.design.replicates + 1)
 CASES = STUDY.cases()
+# In the simulations' commands, and no part of what these depend on.
+STATE_DIR = STUDY.state_dir
+CHECKPOINT_MINUTES = json.dumps(STUDY.simulation.checkpoint_minutes)
 
 
 def result(path):

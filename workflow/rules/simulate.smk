@@ -12,4 +12,5 @@ rule simulate:
     resources:
         **simulation_resources(),
     shell:
-        "python -m hopperopt simulate --case {params.case:q} --threads {threads} --output {output:q} > {log:q} 2>&1"
+        "python -m hopperopt simulate --case {params.case:q} --threads {threads} --state-dir {STATE_DIR:q} "
+        "--checkpoint-minutes {CHECKPOINT_MINUTES} --output {output:q} > {log:q} 2>&1"

@@ -15,7 +15,8 @@ rule verify_simulate:
         **simulation_resources(),
     shell:
         "python -m hopperopt simulate --case {params.case:q} --design {input.design:q} "
-        "--threads {threads} --output {output:q} > {log:q} 2>&1"
+        "--threads {threads} --state-dir {STATE_DIR:q} --checkpoint-minutes {CHECKPOINT_MINUTES} "
+        "--output {output:q} > {log:q} 2>&1"
 
 
 rule verify:

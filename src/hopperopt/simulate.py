@@ -1,0 +1,68 @@
+"""One simulation as a job: its lock and checkpoint, its progress, its file."""
+
+import hashlib
+import json
+import logging
+import sys
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+
+from hopperopt import checkpoint, dataset, files, provenance
+from hopperopt.progress import Reporter
+
+
+def simulate(
+    case: Mapping,
+    digest: str,
+    output: Path,
+    threads: int,
+    checkpoint_minutes: float | None,
+    state_dir: Path,
+) -> None:
+    """Simulate a case with the code of a digest and write its file, with all that says how it was made.
+
+    Goes on from the checkpoint in `state_dir` that an interrupted run of the same case and code has left.
+    Where such a run is still at work, waits for its end and takes its file if it wrote one.
+    """
+    origin = {
+        "case": json.dumps(case, sort_keys=True),
+        "code_digest": digest,
+        "seed": case["seed"],
+    }
+    stamp = {
+        "case": hashlib.sha256(origin["case"].encode()).hexdigest(),
+        "version of the code": origin["code_digest"],
+        "version of a library": f"numpy {metadata.version('numpy')}, numba {metadata.version('numba')}",
+    }
+    with checkpoint.working_on(output, state_dir, stamp, checkpoint_minutes) as (kept, waited):
+        run = _finished(output, origin) if waited else None
+        if run is None:
+            run = _run(case, threads, kept)
+            run.attrs |= provenance.attributes() | origin
+            files.write_netcdf(run, output)
+    level, reached = 1e3 * case["filling"]["level"], 1e3 * float(run["filling_level"])
+    if abs(reached - level) > 1e3 * max(case["particles"]["diameters"]):
+        logging.warning(
+            f"the bed was {reached:.1f} mm high, not {level:g} mm (give or take a coarse particle)"
+        )
+    print(f"{output}: {dataset.outcome(run)}", file=sys.stderr)
+
+
+def _finished(output: Path, origin: Mapping):
+    """The run that the process before wrote, None unless it is of this case and code."""
+    if not output.exists():
+        return None
+    run = files.read_netcdf(output)
+    if any(run.attrs.get(name) != value for name, value in origin.items()):
+        return None
+    logging.info(f"{output} is what that process has just written")
+    return run
+
+
+def _run(case: Mapping, threads: int, kept: checkpoint.Checkpoint):
+    provenance.compile_solver(threads)  # before numba is imported
+    from hopperopt import experiment
+
+    with Reporter(sys.stderr) as progress:
+        return experiment.run(case, progress=progress, threads=threads, checkpoint=kept)
