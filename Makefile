@@ -1,4 +1,6 @@
 # make                     the locked environment in .venv, then the full study
+# make resume              the same after an interruption: simulations go on from their last checkpoints
+# make STUDY=my-hopper     the study in another directory, with a config.yaml of its own; also with resume
 # make setup               the environment alone
 # make test, make lint     in the same environment: the tests; style and the boundaries between modules
 # make test-all            the tests with the full counts: hours
@@ -7,14 +9,26 @@
 # make PYTHON=python3.12   another Python for the environment;   make CORES=4   fewer cores for the study
 
 CORES ?= all
+STUDY ?= .
 stamp := .venv/complete
 install := .venv/bin/python -m pip install -qq --disable-pip-version-check --no-deps --no-build-isolation
 suitable := import ensurepip, sys, venv; sys.exit(sys.implementation.name != "cpython" or not (3, 11) <= sys.version_info < (3, 15))
 version = $(shell $(1) -c 'import sys; print(sys.version)' 2>/dev/null)
 
-.PHONY: study setup test test-all lint validation lock
+snakemake = .venv/bin/snakemake --directory '$(STUDY)'
+# The lock is held by the shell and then by Snakemake in its place, never by a job: it ends with them, however they end.
+define lock_study
+@mkdir -p '$(STUDY)/.snakemake' && exec 9> '$(STUDY)/.snakemake/make.lock' || exit 1; \
+if ! .venv/bin/python -c 'import sys; from hopperopt import locks; sys.exit(not locks.take(9))'; then \
+	echo "another make is at work on this study ($(STUDY)): wait for its end, or stop it first" >&2; exit 1; fi
+endef
+
+.PHONY: study resume setup test test-all lint validation lock
 study: setup
-	.venv/bin/snakemake --cores $(CORES)
+	$(lock_study); exec $(snakemake) --cores $(CORES)
+
+resume: setup
+	$(lock_study); $(snakemake) --unlock && exec $(snakemake) --cores $(CORES) --rerun-incomplete
 
 setup: $(stamp)
 

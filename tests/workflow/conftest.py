@@ -41,19 +41,31 @@ class Study:
 
     def __init__(self, directory, package=CLONE / "src"):
         self.directory, self.package = directory, package
-        self.environment = {**os.environ, "PYTHONPATH": str(package)}
+        told = ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")  # by a make that runs the tests
+        inherited = {name: value for name, value in os.environ.items() if name not in told}
+        self.environment = {**inherited, "PYTHONPATH": str(package)}
 
     def snakemake(self, *options):
         """Run Snakemake; return the completed process with its output as text."""
+        process = self.start_snakemake(*options)
+        output, _ = process.communicate()
+        return subprocess.CompletedProcess(process.args, process.returncode, output)
+
+    def start_snakemake(self, *options):
+        """Start Snakemake; return the process, of a group of its own."""
         program = [sys.executable, "-m", "snakemake", "--snakefile", CLONE / "Snakefile"]
-        return subprocess.run(
-            [*program, "--directory", self.directory, "--cores", "2", *options],
+        return self.start([*program, "--directory", self.directory, "--cores", "2", *options])
+
+    def start(self, command):
+        """Start a command; return the process, of a group of its own, with its output as text."""
+        return subprocess.Popen(
+            command,
             env=self.environment,
             cwd=self.directory,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            check=False,
+            start_new_session=True,
         )
 
     def planned(self, *options):
