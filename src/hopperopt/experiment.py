@@ -193,7 +193,8 @@ class _Experiment:
 
     def height(self):
         """Height of the centre of mass, m."""
-        return float(self.mass @ self.positions()[:, 2] / self.mass.sum())
+        # A sum and no product of vectors: BLAS shares a long one among the cores, and its bits with them.
+        return float(np.sum(self.mass * self.positions()[:, 2]) / self.mass.sum())
 
     def at_rest(self):
         """Whether the kinetic energy is spent and the centre of mass has come to rest."""

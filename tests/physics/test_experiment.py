@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from hopperopt import config, experiment, outflow
 
@@ -106,3 +107,14 @@ def test_explosion_is_reported_by_the_monitors():
     wild["time_step"] = 4.0e-4
     run = experiment.run(wild)
     assert run["status"].item() == "monitor"
+
+
+def test_cores_change_no_bit_of_what_ends_the_filling():
+    """The centre of mass of the study's batch, large enough for BLAS to share a product among the cores."""
+    full = experiment._Experiment(config.parse({}).simulation_case(None, "full", 1), None, 1)
+    heights = set()
+    for threads in (1, 2):
+        with threadpool_limits(threads, user_api="blas"):
+            heights.add(full.height())
+    assert len(full.mass) > 14_000
+    assert len(heights) == 1

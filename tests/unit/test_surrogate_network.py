@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.optimize import approx_fprime, least_squares
+from threadpoolctl import threadpool_limits
 
 from hopperopt.surrogate import levenberg_marquardt, network
 
@@ -91,6 +92,19 @@ def test_networks_do_not_depend_on_their_batch(monkeypatch):
         assert ours.tobytes() == theirs.tobytes()
     np.testing.assert_array_equal(together.epochs, alone.epochs)
     np.testing.assert_array_equal(together.validation_error, alone.validation_error)
+
+
+def test_cores_change_no_bit_of_many_predictions():
+    """BLAS shares a product among the cores where it is large enough, and ends it differently."""
+    weights = network.initial_weights(7, INPUTS, OUTPUTS, seeds(1))
+    same = network.Scaling(np.zeros(INPUTS), np.ones(INPUTS))
+    trained = network.Network(weights.hidden[0], weights.output[0], same, same)
+    inputs = np.random.default_rng(1).uniform(-1, 1, (network.CHUNK, INPUTS))
+    predictions = []
+    for threads in (1, 2):
+        with threadpool_limits(threads, user_api="blas"):
+            predictions.append(trained.predict(inputs).tobytes())
+    assert predictions[0] == predictions[1]
 
 
 def test_training_stops_six_epochs_after_the_best_validation_epoch():

@@ -3,9 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
-from hopperopt.surrogate.network import Weights, flatten, forward, normal_equations, unflatten
+from hopperopt.surrogate.network import Weights, flatten, forward, normal_equations, one_thread, unflatten
 
 MU_START, MU_GROWTH, MU_DECAY, MU_MAX, MU_MIN = 1e-3, 10.0, 0.1, 1e10, 1e-20
 VALIDATION_FAILURES = 6
@@ -30,6 +29,7 @@ class Sample(NamedTuple):
     targets: np.ndarray
 
 
+@one_thread
 def fit(
     start: Weights, training: Sample, validation: Sample | None = None, max_epochs: int = MAX_EPOCHS
 ) -> Fit:
@@ -45,14 +45,12 @@ def fit(
     start: Weights of n networks; training, validation: Sample. Returns Fit; every network's result depends on
     its own start alone, to the bit.
     """
-    # One thread: the products are small, and their bits must not depend on the number of cores.
-    with threadpool_limits(1, user_api="blas"):
-        parts = [
-            _fit_batch(
-                Weights(*(layer[first : first + BATCH] for layer in start)), training, validation, max_epochs
-            )
-            for first in range(0, len(start.hidden), BATCH)
-        ]
+    parts = [
+        _fit_batch(
+            Weights(*(layer[first : first + BATCH] for layer in start)), training, validation, max_epochs
+        )
+        for first in range(0, len(start.hidden), BATCH)
+    ]
     weights = Weights(
         *(np.concatenate(layers) for layers in zip(*(part.weights for part in parts), strict=True))
     )

@@ -9,6 +9,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from threadpoolctl import threadpool_limits
+
+# Decorates what multiplies matrices: the bits of large products depend on the number of BLAS' threads.
+one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
 
 CHUNK = 50_000  # rows predicted at a time, to bound the memory
 
@@ -43,6 +47,7 @@ class Network(NamedTuple):
     inputs_scaling: Scaling
     outputs_scaling: Scaling
 
+    @one_thread
     def predict(self, inputs: np.ndarray) -> np.ndarray:
         """Outputs (n, outputs) at inputs (n, inputs), both in their own units."""
         weights = Weights(self.hidden[None], self.output[None])
