@@ -121,6 +121,12 @@ def simulation_resources():
     return {"mem_mb": 1000 + particles // 500, "runtime": 10 + round(particles * steps / 2e6 / 60)}
 
 
+def plan_runs():
+    """Files of all runs of the plan."""
+    run = result("simulations/{experiment}_rep_{replicate}.nc")
+    return expand(run, experiment=EXPERIMENTS, replicate=REPLICATES)
+
+
 def verification_runs(case):
     """Files of a verification case's runs."""
     replicates = range(1, STUDY.verification.replicates + 1)

@@ -2,11 +2,7 @@ rule gather:
     """One data set of all runs of the plan."""
     input:
         design=result("design.csv"),
-        simulations=expand(
-            result("simulations/{experiment}_rep_{replicate}.nc"),
-            experiment=EXPERIMENTS,
-            replicate=REPLICATES,
-        ),
+        simulations=plan_runs(),
     output:
         dataset=result("dataset.nc"),
         runs=report(result("runs.csv"), caption="../report/runs.rst", category="Tables"),
