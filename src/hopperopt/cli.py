@@ -40,7 +40,7 @@ class Stage(NamedTuple):
 
 
 STAGES = {
-    "design": Stage("design", "write_table", (), ("design.csv",), "write the plan's table"),
+    "design": Stage("dataset", "write_plan", (), ("design.csv",), "write the plan's table"),
     "gather": Stage(
         "dataset", "gather", ("design", "simulations*"), ("dataset.nc", "runs.csv"), "gather the plan's runs"
     ),

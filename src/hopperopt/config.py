@@ -486,11 +486,14 @@ class Study(Setup):
         """What `derived_case` needs, beside the design that is found later, for one run (plain JSON)."""
         centre = self.with_design(plans.centre(self.levels)).document
         setup = {key: centre[key] for key in Setup.model_fields if key != "seed"}
-        used = ("shape", "height_mm", self.insert.shape)
+        # Without what no case depends on, which would only rerun the simulation.
+        used = ("shape",) if self.insert.shape == "none" else ("shape", "height_mm", self.insert.shape)
         setup["insert"] = {key: value for key, value in setup["insert"].items() if key in used}
         setup["discharge"].pop("incomplete")
         for unused in ("threads", "checkpoint_minutes"):
             setup["simulation"].pop(unused)
+        if setup["filling"]["particles"] is not None:
+            setup["filling"].pop("bed_solid_fraction")
         keys = {name: factor.key for name, factor in self.factors.items()}
         return {"setup": setup, "keys": keys, "seed": run_seed(self.seed, name, replicate)}
 

@@ -1,4 +1,4 @@
-"""The plan's runs gathered in one dataset, and which runs may be data points at all."""
+"""The plan's table, its runs gathered in one dataset, and which runs may be data points at all."""
 
 import json
 import logging
@@ -18,6 +18,21 @@ RESULTS = ("discharge_time", "discharge_rate", "mass_flow_index")
 NAMED = 30  # experiments in one sentence
 # Unit of a factor by the end of its name.
 UNITS = {"_deg": "degree", "_mm": "mm", "_kg_m3": "kg m-3", "_pa": "Pa", "_m_s": "m s-1", "_s": "s"}
+
+
+def write_plan(params: Mapping, output: str | os.PathLike) -> None:
+    """Write design.csv: experiment, a column for each factor, a column of level numbers for each factor.
+
+    params: `factors`, their names in order; `experiments`, dicts of `name`, `design` and `levels` (1-based
+    numbers; empty without levels, as are their columns then).
+    """
+    rows = [
+        {"experiment": row["name"]}
+        | {factor: row["design"][factor] for factor in params["factors"]}
+        | {f"{factor}_level": row["levels"].get(factor) for factor in params["factors"]}
+        for row in params["experiments"]
+    ]
+    files.write_table(pd.DataFrame(rows), output)
 
 
 def gather(

@@ -1,4 +1,4 @@
-"""Plans of experiments: which designs are simulated, under which names, and their table."""
+"""Plans of experiments: which designs are simulated, and under which names."""
 
 import csv
 import io
@@ -149,22 +149,3 @@ def points_from_csv(text):
     if len(points) < 2 or not all(map(math.isfinite, [number for point in points for number in point])):
         raise NotAllowed("a CSV file with the columns r_mm, z_mm and numbers in at least two rows")
     return points
-
-
-def write_table(params, output):
-    """Write design.csv: experiment, a column for each factor, a column of level numbers for each factor.
-
-    params: `factors`, their names in order; `experiments`, dicts of `name`, `design` and `levels` (1-based
-    numbers; empty without levels, as are their columns then).
-    """
-    import pandas as pd
-
-    from hopperopt import files
-
-    rows = [
-        {"experiment": row["name"]}
-        | {factor: row["design"][factor] for factor in params["factors"]}
-        | {f"{factor}_level": row["levels"].get(factor) for factor in params["factors"]}
-        for row in params["experiments"]
-    ]
-    files.write_table(pd.DataFrame(rows), output)

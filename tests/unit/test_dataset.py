@@ -1,12 +1,13 @@
 """The data set holds every run at its place, and no run that did not end well."""
 
+import csv
 import json
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from hopperopt import dataset, files
+from hopperopt import dataset, design, files
 
 PLAN = pd.DataFrame(
     {
@@ -41,6 +42,22 @@ def gather(study, **params):
 
 def spoil(study, make_run, name, **changes):
     files.write_netcdf(make_run(**changes), study / name)
+
+
+LEVELS = {"theta_deg": (60, 57.5, 55, 52.5, 50), "length_mm": (50, 45, 40, 35, 30)}
+
+
+@pytest.mark.parametrize("plan", [design.l25(LEVELS), design.lhs(LEVELS, 4, 1)])
+def test_table_of_the_plan(tmp_path, plan):
+    params = {"factors": list(LEVELS), "experiments": [experiment._asdict() for experiment in plan]}
+    dataset.write_plan(params, tmp_path / "design.csv")
+    rows = list(csv.DictReader((tmp_path / "design.csv").open()))
+    numbers = [f"{name}_level" for name in LEVELS]
+    assert list(rows[0]) == ["experiment", *LEVELS, *numbers]
+    for row, experiment in zip(rows, plan, strict=True):
+        assert row["experiment"] == experiment.name
+        assert {name: float(row[name]) for name in LEVELS} == experiment.design
+        assert [row[name] for name in numbers] == [str(experiment.levels.get(name, "")) for name in LEVELS]
 
 
 def test_runs_stand_at_their_experiment_and_replicate(study):

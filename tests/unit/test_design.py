@@ -1,6 +1,5 @@
-"""Plans: the orthogonal array, samplings within the ranges, names, the table."""
+"""Plans: the orthogonal array, samplings within the ranges, names."""
 
-import csv
 from itertools import combinations, product
 
 import numpy as np
@@ -69,19 +68,6 @@ def test_sobol_points_are_balanced():
 def test_centre_is_the_middle_level_in_any_order():
     assert design.centre(FACTORS) == {"theta_deg": 55.0, "length_mm": 40.0, "height_mm": 29.6}
     assert design.centre({"a": (3, 1, 2), "b": (10, 20)}) == {"a": 2.0, "b": 15.0}
-
-
-@pytest.mark.parametrize("plan", [design.l25(FACTORS), design.lhs(FACTORS, 4, 1)])
-def test_table(tmp_path, plan):
-    params = {"factors": list(FACTORS), "experiments": [experiment._asdict() for experiment in plan]}
-    design.write_table(params, tmp_path / "design.csv")
-    rows = list(csv.DictReader((tmp_path / "design.csv").open()))
-    levels = [f"{name}_level" for name in FACTORS]
-    assert list(rows[0]) == ["experiment", *FACTORS, *levels]
-    for row, experiment in zip(rows, plan, strict=True):
-        assert row["experiment"] == experiment.name
-        assert {name: float(row[name]) for name in FACTORS} == experiment.design
-        assert [row[name] for name in levels] == [str(experiment.levels.get(name, "")) for name in FACTORS]
 
 
 def test_own_plan_may_have_spaces():
