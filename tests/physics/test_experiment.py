@@ -37,6 +37,11 @@ def test_experiment_is_complete_and_within_the_monitors(ternary):
     assert 0.0 < ternary["filling_time"].item() < 1.0
 
 
+def test_threads_change_no_bit_of_an_experiment(ternary):
+    again = experiment.run(case(), threads=3)
+    assert again.drop_attrs(deep=False).identical(ternary.drop_attrs(deep=False))
+
+
 def test_all_mass_that_was_filled_leaves(ternary):
     """Every sphere passes the sensor once; the windows' masses add up to the batch's 8 : 27 : 64."""
     times = ternary["exit_time"].values

@@ -40,7 +40,7 @@ class Study:
     """A directory with a study, and Snakemake in it."""
 
     def __init__(self, directory, package=CLONE / "src"):
-        self.directory, self.package = directory, package
+        self.directory, self.clone = directory, CLONE
         told = ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")  # by a make that runs the tests
         inherited = {name: value for name, value in os.environ.items() if name not in told}
         self.environment = {**inherited, "PYTHONPATH": str(package)}
@@ -53,7 +53,7 @@ class Study:
 
     def start_snakemake(self, *options):
         """Start Snakemake; return the process, of a group of its own."""
-        program = [sys.executable, "-m", "snakemake", "--snakefile", CLONE / "Snakefile"]
+        program = [sys.executable, "-m", "snakemake", "--snakefile", self.clone / "Snakefile"]
         return self.start([*program, "--directory", self.directory, "--cores", "2", *options])
 
     def start(self, command):
@@ -68,30 +68,71 @@ class Study:
             start_new_session=True,
         )
 
-    def planned(self, *options):
-        """Names of the jobs that a dry run plans: the rule, for a simulation its run as well."""
+    def jobs(self, *options):
+        """(rule, paths of its outputs) of each job that a dry run plans."""
         answer = self.snakemake("--dry-run", *options)
         assert answer.returncode == 0, answer.stdout
-        jobs = re.findall(r"^(?:local)?rule (\w+):\n((?:    .*\n)*)", answer.stdout, re.MULTILINE)
-        outputs = [(rule, re.search(r"output: \S*/(\S+)\.nc", block)) for rule, block in jobs]
-        return {f"{rule} {found[1]}" if rule in SIMULATIONS else rule for rule, found in outputs} - {"all"}
+        job = r"^(?:local)?rule (\w+):\n(?:    .*\n)*?    output: (.*)\n"
+        found = re.findall(job, answer.stdout, re.MULTILINE)
+        return [(rule, outputs.split(", ")) for rule, outputs in found]
+
+    def planned(self, *options):
+        """Names of the jobs that a dry run plans: the rule, for a simulation its run as well."""
+        return {
+            f"{rule} {Path(outputs[0]).stem}" if rule in SIMULATIONS else rule
+            for rule, outputs in self.jobs(*options)
+        }
 
     def edit(self, name, old, new):
         """Replace text that stands once in a file of the study."""
-        path = self.directory / name
-        text = path.read_text()
-        assert text.count(old) == 1, f"{old!r} is {text.count(old)} times in {path}"
-        path.write_text(text.replace(old, new))
+        _replace(self.directory / name, old, new)
+
+    def edit_code(self, name, old, new):
+        """Replace text that stands once in a file of the clone; of a copy of it, from here on."""
+        self._own_clone()
+        _replace(self.clone / name, old, new)
+
+    def add_code(self, module, text):
+        """Add text to the end of a module of the package."""
+        self._own_clone()
+        with (self.clone / "src" / "hopperopt" / module).open("a") as file:
+            file.write(text)
+
+    def _own_clone(self):
+        if self.clone != CLONE:
+            return
+        self.clone = self.directory.parent / "clone"
+        for name in ("workflow", "profiles", "src"):
+            shutil.copytree(CLONE / name, self.clone / name)
+        shutil.copy(CLONE / "Snakefile", self.clone)
+        self.environment["PYTHONPATH"] = str(self.clone / "src")
+
+    def pretend(self):
+        """Make every file of the study without computing anything, and have Snakemake take them for done."""
+        for _, outputs in self.jobs():
+            for path in outputs:
+                (self.directory / path).parent.mkdir(parents=True, exist_ok=True)
+                (self.directory / path).write_text(path)
+        answer = self.snakemake("--touch", "--forceall")
+        assert answer.returncode == 0, answer.stdout
+
+
+def _replace(path, old, new):
+    text = path.read_text()
+    assert text.count(old) == 1, f"{old!r} is {text.count(old)} times in {path}"
+    path.write_text(text.replace(old, new))
 
 
 @pytest.fixture(scope="session")
 def new_study():
-    """Function that makes a study of a directory and the text of its configuration, or of edited code."""
+    """Function that makes a study of a directory and the texts of its files, config.yaml first."""
 
-    def make(directory, config, additions=None):
+    def make(directory, config, **files):
+        directory.mkdir(exist_ok=True)
         (directory / "config.yaml").write_text(config)
-        package = CLONE / "src" if additions is None else copied_package(directory / "src", additions)
-        return Study(directory, package)
+        for name, text in files.items():
+            (directory / f"{name}.csv").write_text(text)
+        return Study(directory)
 
     return make
 
@@ -99,9 +140,7 @@ def new_study():
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory, new_study):
     """The tiny study after its one run; not to be changed."""
-    directory = tmp_path_factory.mktemp("study")
-    (directory / "plan.csv").write_text(PLAN)
-    study = new_study(directory, CONFIG)
+    study = new_study(tmp_path_factory.mktemp("study"), CONFIG, plan=PLAN)
     answer = study.snakemake()
     assert answer.returncode == 0, answer.stdout
     return study
@@ -112,22 +151,3 @@ def study(finished, tmp_path):
     """A copy of the finished study."""
     shutil.copytree(finished.directory, tmp_path / "study")
     return Study(tmp_path / "study")
-
-
-@pytest.fixture
-def edited(study, tmp_path):
-    """Function that returns the copied study with a copy of the package; text is added to its modules."""
-
-    def edit(additions):
-        return Study(study.directory, copied_package(tmp_path / "src", additions))
-
-    return edit
-
-
-def copied_package(folder, additions):
-    """Copy the package and add text to the ends of modules; return the copy's folder."""
-    shutil.copytree(CLONE / "src" / "hopperopt", folder / "hopperopt")
-    for module, text in additions.items():
-        with (folder / "hopperopt" / module).open("a") as file:
-            file.write(text)
-    return folder
