@@ -37,7 +37,9 @@ def test_experiment_is_complete_and_within_the_monitors(ternary):
     assert 0.0 < ternary["filling_time"].item() < 1.0
 
 
+@pytest.mark.full
 def test_threads_change_no_bit_of_an_experiment(ternary):
+    """Threads wait for each other at every step: slow wherever the cores are busy."""
     again = experiment.run(case(), threads=3)
     assert again.drop_attrs(deep=False).identical(ternary.drop_attrs(deep=False))
 
