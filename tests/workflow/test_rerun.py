@@ -143,6 +143,7 @@ OTHER = {
     "simulation.time_step_s": "auto",
     "simulation.gravity_m_s2": 9.8,
     "simulation.threads": 2,
+    "simulation.checkpoint_minutes": 7,
     "design.replicates": 2,
     "design.lhs.experiments": 5,
     "design.lhs.seed": 2,
