@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hopperopt import provenance
-from hopperopt.document import ConfigError, lookup
+from hopperopt.document import ConfigError, NotAllowed, lookup
+from hopperopt.quantity import Quantity
 
 BAD_INPUT = 2
 MOST_SEED = 2**63 - 1
@@ -184,9 +185,11 @@ def _simulate(given: argparse.Namespace) -> None:
     threads = given.threads or threads
     # The workflow's digest only makes Snakemake run this anew; what is recorded is the code that runs.
     case.pop("code", None)
-    given.output.parent.mkdir(parents=True, exist_ok=True)
+    from hopperopt import files
+
+    files.check_writable(given.output)  # before hours of work
     provenance.compile_solver(threads)
-    from hopperopt import dataset, experiment, files
+    from hopperopt import dataset, experiment
     from hopperopt.progress import Reporter
 
     with Reporter(sys.stderr) as progress:
@@ -245,8 +248,8 @@ def _design(study, typed: dict[str, str]) -> dict[str, float]:
         if name not in design:
             raise ConfigError(f"--factor: {name} is not allowed; allowed: {', '.join(design)}")
         try:
-            design[name] = float(value)
-        except ValueError:
+            design[name] = Quantity().read(value)
+        except NotAllowed:
             raise ConfigError(f"{name}: {value} is not allowed; allowed: a number") from None
     for name, value in design.items():
         if not isinstance(value, int | float):  # the key holds null or a word, as auto
