@@ -61,7 +61,7 @@ def _column_radius(setup):
     return setup.hopper.cylinder_radius_mm / MM - setup.particles.diameters[-1] / 2
 
 
-def _column_top(setup):
+def column_top(setup):
     """Height of the column that the particles fill at the column's solid fraction."""
     sphere = math.pi / 6 * sum(diameter**3 for diameter in setup.particles.diameters) / 3
     section = math.pi * _column_radius(setup) ** 2
@@ -73,4 +73,4 @@ def _wall_top(setup):
     """Height of the wall: clear of the column's spheres and the rise of those that start upwards."""
     upwards = SCATTERS * setup.filling.speed_scatter_m_s
     rise = upwards * upwards / (2 * setup.simulation.gravity_m_s2)
-    return _column_top(setup) + setup.particles.diameters[-1] + rise + HEADROOM
+    return column_top(setup) + setup.particles.diameters[-1] + rise + HEADROOM

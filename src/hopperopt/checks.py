@@ -4,23 +4,28 @@ Works on the models' attributes alone. A refusal or warning about designs is sai
 """
 
 import difflib
+import math
 import re
 from contextlib import suppress
 from typing import NamedTuple
 
+from hopperopt import case as cases
 from hopperopt import design as plans
-from hopperopt import geometry
+from hopperopt import geometry, impact
+from hopperopt.dem.materials import contact_law
 from hopperopt.document import ConfigError, dotted_keys, mistake
 
 MM = 1000.0
 SIMULATED = {"hopper", "insert", "particles", "wall", "contact", "filling", "discharge", "simulation"}
 SMALLEST_GAP, USUAL_GAP = 2, 3  # coarse diameters between insert and wall
-USUAL_OUTLET = 5  # coarse diameters
+USUAL_OUTLET = 5, 200  # coarse diameters
 MOST_PARTICLES = 10_000_000
+MOST_RUNS = 10_000  # of the plan, and of the verification
 SHORTEST_STEP, USUAL_STEP = 1e-4, 0.4  # Rayleigh times
 # The scheme is stable at the paper's step for the paper's materials: those with at most its restitution and
 # friction may take it without a warning.
 TESTED = {"step": 0.78, "restitution": 0.7, "static_friction": 0.5}
+USUAL_COMPRESSION, USUAL_REBOUND = 0.25, 1.8  # see hopperopt.impact
 MOST_CORNERS = 256
 FOLDS = 5  # of the cross-validation
 
@@ -44,11 +49,11 @@ def _sentence(finding, where=""):
 
 
 def _refused(setup):
-    """Findings that make a simulation impossible: hopper, time step, insert."""
-    yield from _hopper(setup)
-    yield from _filling(setup)
-    yield from _time_step(setup)
-    if setup.insert_profile is not None:
+    """Findings that make a simulation impossible. What does not fit a wrong hopper, or spheres of a wrong
+    size, is no mistake of its own."""
+    found = list(_hopper(setup)) or list(_filling(setup)) or list(_time_step(setup))
+    yield from found
+    if setup.insert_profile is not None and not any(finding.key.startswith("hopper") for finding in found):
         yield from _insert(setup)
 
 
@@ -56,24 +61,31 @@ def _no(key, kind, badness, value, allowed):
     return Finding(key, kind, badness, f"{value}{{where}} is not allowed; allowed: {allowed}")
 
 
+def _unit(value, low, high):
+    """A question for a length (mm) that would lie between `low` and `high` if it were typed in metres."""
+    return f" (in metres? {value:.4g} m is {value * MM:.4g} mm)" if low <= abs(value) * MM <= high else ""
+
+
 def _hopper(setup):
     hopper, coarse = setup.hopper, setup.particles.diameters_mm[-1]
     if hopper.cylinder_radius_mm <= hopper.outlet_radius_mm:
         allowed = f"more than the outlet's radius, {hopper.outlet_radius_mm:g} mm"
+        allowed += _unit(hopper.cylinder_radius_mm, hopper.outlet_radius_mm, MM)
         yield _no("hopper.cylinder_radius_mm", "narrow", 0, f"{hopper.cylinder_radius_mm:g}", allowed)
     if hopper.outlet_radius_mm < coarse / 2:
         allowed = f"at least the radius of the largest sphere, {coarse / 2:g} mm"
+        allowed += _unit(hopper.outlet_radius_mm, coarse / 2, hopper.cylinder_radius_mm)
         yield _no("hopper.outlet_radius_mm", "small", 0, f"{hopper.outlet_radius_mm:g}", allowed)
 
 
 def _filling(setup):
     level, coarse = setup.filling.level_mm, setup.particles.diameters_mm[-1]
     if level < coarse:
-        yield _no(
-            "filling.level_mm", "level", -level, f"{level:g}", f"at least a coarse diameter, {coarse:g} mm"
-        )
+        allowed = f"at least a coarse diameter, {coarse:g} mm{_unit(level, coarse, MM)}"
+        yield _no("filling.level_mm", "level", -level, f"{level:g}", allowed)
     if setup.particle_count > MOST_PARTICLES:
-        count, allowed = f"filling with {setup.particle_count:.2g} particles", f"at most {MOST_PARTICLES:g}"
+        count = f"filling with {setup.particle_count:.2g} particles"
+        allowed = f"at most {MOST_PARTICLES:g}{_unit(coarse, 0, 2 * setup.hopper.outlet_radius_mm)}"
         yield _no("particles.diameters_mm", "count", setup.particle_count, count, allowed)
 
 
@@ -105,6 +117,7 @@ def _insert(setup):
         if gap > 0:
             value = f"a gap of {gap * MM:.3g} mm between insert and wall"
         least = f"a gap of at least {SMALLEST_GAP * coarse * MM:g} mm ({SMALLEST_GAP} coarse diameters)"
+        least += _unit(setup.insert.height_mm, coarse * MM, setup.filling.level_mm)
         yield _no("insert", "gap", -gap, value, least)
 
 
@@ -118,14 +131,25 @@ def _gap(setup):
 def _unusual(setup):
     """Findings that a simulation can live with."""
     coarse, hopper = setup.particles.diameters[-1], setup.hopper
-    width = 2 * hopper.outlet_radius_mm / MM / coarse
-    if width < USUAL_OUTLET:
-        text = f"an outlet of {width:.3g} coarse diameters{{where}} may jam; usual: {USUAL_OUTLET} or more"
+    width, (least, most) = 2 * hopper.outlet_radius_mm / MM / coarse, USUAL_OUTLET
+    if width < least:
+        text = f"an outlet of {width:.3g} coarse diameters{{where}} may jam; usual: {least} or more"
         yield Finding("hopper.outlet_radius_mm", "outlet", -width, text)
+    elif width > most:
+        text = (
+            f"an outlet of {width:.3g} coarse diameters{{where}}; usual: at most {most} (all lengths in mm)"
+        )
+        yield Finding("hopper.outlet_radius_mm", "wide", width, text)
+    depth = -setup.discharge.sensor_mm / MM
+    if depth < coarse / 2:
+        text = f"{-depth * MM:g}{{where}} is less than a coarse radius below the outlet"
+        text += _unit(depth * MM, coarse / 2 * MM, MM)
+        yield Finding("discharge.sensor_mm", "sensor", -depth, text)
     share = setup.time_step / setup.particles.rayleigh_time
     if share > USUAL_STEP and not _tested(setup, share):
         text = f"{share:.2f} Rayleigh times{{where}}: an impact may gain energy; usual: at most {USUAL_STEP}"
         yield Finding("simulation.time_step_s", "step", share, text)
+    yield from _hard_impacts(setup)
     profile = setup.insert_profile
     if profile is None:
         return
@@ -134,10 +158,39 @@ def _unusual(setup):
             f"a gap to the wall of {gap / coarse:.2f} coarse diameters{{where}}; usual: {USUAL_GAP} or more"
         )
         yield Finding("insert", "gap", -gap, text)
+    if (width := float(profile[:, 0].max())) < coarse / 2:
+        text = f"its radius, {width * MM:.3g} mm{{where}}, is less than a coarse sphere's"
+        text += _unit(width * MM, coarse / 2 * MM, setup.hopper.cylinder_radius_mm)
+        yield Finding(f"insert.{setup.insert.shape}", "thin", -width, text)
     apex, level = float(profile[:, 1].max()) * MM, setup.filling.level_mm
     if apex > level:
         text = f"the apex, at {apex:.3g} mm, stands above the bed's surface, at {level:g} mm{{where}}"
         yield Finding("insert", "apex", apex - level, text)
+
+
+def _hard_impacts(setup):
+    """Impacts that may break the monitors of overlap and speed."""
+    spheres, filling, contact = setup.particles, setup.filling, setup.contact
+    fine, _, coarse = spheres.diameters
+    sphere = (spheres.shear_modulus_pa, spheres.poisson_ratio)
+    others = (sphere, (setup.wall.shear_modulus_pa, setup.wall.poisson_ratio))
+    modulus = min(contact_law(sphere, other, 1, 0, 0).modulus for other in others)
+    start = filling.speed_m_s + 3 * filling.speed_scatter_m_s
+    speed = math.sqrt(start**2 + 2 * setup.simulation.gravity_m_s2 * cases.column_top(setup))
+    compression = impact.compression(fine, coarse, spheres.density_kg_m3, modulus, speed)
+    if compression > USUAL_COMPRESSION:
+        text = (
+            f"a coarse sphere that falls at {speed:.2g} m/s may compress a fine one by {compression:.2f} of "
+            f"its radius{{where}}; usual: at most {USUAL_COMPRESSION} (a run that exceeds 0.3 is refused)"
+        )
+        yield Finding("particles.shear_modulus_pa", "soft", compression, text)
+    rebound = impact.rebound(spheres.diameters, contact.particle.restitution, contact.wall.restitution)
+    if rebound > USUAL_REBOUND:
+        text = (
+            f"a fine sphere may rebound from coarse ones at {rebound:.2f} times the speed of free fall"
+            f"{{where}}; usual: at most {USUAL_REBOUND} (a run that exceeds 2 is refused)"
+        )
+        yield Finding("contact.particle.restitution", "rebound", rebound, text)
 
 
 def _tested(setup, share):
@@ -173,6 +226,7 @@ def mistakes(study, faulty):
     rules = (
         ("keys", SIMULATED | {"factors"}, _factor_keys),
         ("plan", {"factors", "design"}, _plan),
+        ("runs", {"design", "verification", "plan", "keys"}, _runs),
         ("network", {"surrogate", "design", "plan", "keys"}, _network),
         ("explicit", {"factors", "optimise"}, _explicit),
         ("cases", {"factors", "verification"}, _cases),
@@ -242,6 +296,15 @@ def _plan(study):
     for name, factor in study.factors.items():
         if len(factor.levels) != 5:
             yield mistake(f"factors.{name}.levels", factor.levels, "five levels with plan l25")
+
+
+def _runs(study):
+    """The plan and the verification have no more runs than Snakemake can take."""
+    for section, names in (("design", study.plan), ("verification", study.verification.cases)):
+        replicates = getattr(study, section).replicates
+        if len(names) * replicates > MOST_RUNS:
+            allowed = f"at most {MOST_RUNS // len(names)} for {len(names)} designs ({MOST_RUNS} runs)"
+            yield mistake(f"{section}.replicates", replicates, allowed)
 
 
 def _network(study):
@@ -323,7 +386,8 @@ def _plan_values(study):
 
 def _case_values(study):
     """Each value of a fixed case, or of the explicit choice, is allowed where its factor's key stands."""
-    fixed = {f"verification.cases.{name}": case for name, case in study.cases().items()}
+    fixed = {"factors (the middle levels)": plans.centre(study.levels)}
+    fixed |= {f"verification.cases.{name}": case for name, case in study.cases().items()}
     if study.optimise.select == "explicit":
         fixed["optimise.explicit"] = study.optimise.explicit
     for place, design in fixed.items():
