@@ -106,3 +106,12 @@ def test_explosion_is_reported_by_the_monitors():
     wild["time_step"] = 4.0e-4
     run = experiment.run(wild)
     assert run["status"].item() == "monitor"
+
+
+def test_spheres_that_fall_as_one_have_no_rate():
+    """Three equal spheres on the gate fall side by side: the mass leaves within one step."""
+    few = case(diameters=(0.003, 0.003, 0.003))
+    few["particles"]["counts"] = [1, 1, 1]
+    few["walls"]["hopper"], few["walls"]["gate"] = [[0.022, 0.0], [0.022, 0.16]], [[0.0, 0.0], [0.022, 0.0]]
+    run = experiment.run(few)
+    assert run["status"].item() == "complete" and np.isnan(run["discharge_rate"].item())
