@@ -24,7 +24,7 @@ from pydantic import (
 from pydantic_core import core_schema
 
 from hopperopt import case as cases
-from hopperopt import checks, geometry
+from hopperopt import checks, findings, geometry
 from hopperopt import design as plans
 from hopperopt.document import (
     ConfigError,
@@ -208,9 +208,9 @@ class Filling(Model):
     """How the hopper is filled: up to a level, or with a fixed number of particles."""
 
     level_mm: Length = 74.0
-    particles: Annotated[int | None, Number(least=3, most=checks.MOST_PARTICLES), AfterValidator(_thirds)] = (
-        None
-    )
+    particles: Annotated[
+        int | None, Number(least=3, most=findings.MOST_PARTICLES), AfterValidator(_thirds)
+    ] = None
     bed_solid_fraction: Annotated[float, Number(above=0, most=0.74)] = 0.55
     column_solid_fraction: Annotated[float, Number(above=0, most=0.3)] = 0.2
     speed_m_s: Speed = 0.5
@@ -293,7 +293,7 @@ class Setup(Model):
 
     def case(self, labels, seed):
         """One simulation as plain JSON values in SI; ConfigError where it cannot be simulated."""
-        if refusals := checks.refusals(self):
+        if refusals := findings.refusals(self):
             raise ConfigError("\n".join(refusals))
         return cases.simulation(self, labels, seed)
 
@@ -575,10 +575,9 @@ def _models(document):
 
 def _results_folder(study, directory):
     """The sentence for a `results_dir` that no folder can have."""
-    place = directory / study.results_dir
+    path = directory / study.results_dir
     try:
-        while not place.exists():
-            place = place.parent
+        place = next((place for place in (path, *path.parents) if place.exists()), directory)
     except OSError as error:
         yield mistake("results_dir", study.results_dir, f"the path of a folder ({error.strerror})")
         return

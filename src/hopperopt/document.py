@@ -66,11 +66,12 @@ def _read(path):
 
 def _distinct(pairs):
     """The dict of a JSON object's pairs; ConfigError when a key is there twice."""
-    keys = [key for key, _ in pairs]
-    for key in keys:
-        if keys.count(key) > 1:
+    document = {}
+    for key, value in pairs:
+        if key in document:
             raise ConfigError(f"{key}: is there twice")
-    return dict(pairs)
+        document[key] = value
+    return document
 
 
 def _yaml(path, text):
