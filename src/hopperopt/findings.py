@@ -18,7 +18,8 @@ SHORTEST_STEP, USUAL_STEP = 1e-4, 0.4  # Rayleigh times
 # The scheme is stable at the paper's step for the paper's materials: those with at most its restitution and
 # friction may take it without a warning.
 TESTED = {"step": 0.78, "restitution": 0.7, "static_friction": 0.5}
-USUAL_COMPRESSION, USUAL_REBOUND = 0.25, 1.8  # see hopperopt.impact
+USUAL_COMPRESSION, USUAL_SWING, USUAL_REBOUND = 0.25, 2.1, 1.7  # see hopperopt.impact
+USUAL_SIZES = 2.5  # coarse over fine diameter
 
 
 class Finding(NamedTuple):
@@ -161,20 +162,30 @@ def unusual(setup):
 
 def _hard_impacts(setup):
     """Impacts that may break the monitors of overlap and speed."""
-    spheres, filling, contact = setup.particles, setup.filling, setup.contact
+    spheres, contact = setup.particles, setup.contact
     fine, _, coarse = spheres.diameters
     sphere = (spheres.shear_modulus_pa, spheres.poisson_ratio)
     others = (sphere, (setup.wall.shear_modulus_pa, setup.wall.poisson_ratio))
-    modulus = min(contact_law(sphere, other, 1, 0, 0).modulus for other in others)
-    start = filling.speed_m_s + 3 * filling.speed_scatter_m_s
-    speed = math.sqrt(start**2 + 2 * setup.simulation.gravity_m_s2 * cases.column_top(setup))
-    compression = impact.compression(fine, coarse, spheres.density_kg_m3, modulus, speed)
+    moduli = [contact_law(sphere, other, 1, 0, 0).modulus for other in others]
+    speed = _fall_speed(setup)
+    compression = impact.compression(fine, coarse, spheres.density_kg_m3, min(moduli), speed)
     if compression > USUAL_COMPRESSION:
         text = (
             f"a coarse sphere that falls at {speed:.2g} m/s may compress a fine one by {compression:.2f} of "
             f"its radius{{where}}; usual: at most {USUAL_COMPRESSION} (a run that exceeds 0.3 is refused)"
         )
         yield Finding("particles.shear_modulus_pa", "soft", compression, text)
+    swing = impact.swing(fine, coarse, spheres.density_kg_m3, moduli, compression, setup.time_step)
+    if swing > USUAL_SWING:
+        text = (
+            f"too long for a fine sphere squeezed by a coarse one, whose angular frequency times the step is "
+            f"{swing:.2f}{{where}}; usual: at most {USUAL_SWING}"
+        )
+        yield Finding("simulation.time_step_s", "swing", swing, text)
+    if coarse > USUAL_SIZES * fine:
+        text = f"1 : {coarse / fine:.3g}{{where}}: fine spheres may be flung off"
+        text += f"; usual: at most 1 : {USUAL_SIZES} (a run with one at twice the speed of fall is refused)"
+        yield Finding("particles.diameters_mm", "sizes", coarse / fine, text)
     rebound = impact.rebound(spheres.diameters, contact.particle.restitution, contact.wall.restitution)
     if rebound > USUAL_REBOUND:
         text = (
@@ -182,6 +193,12 @@ def _hard_impacts(setup):
             f"{{where}}; usual: at most {USUAL_REBOUND} (a run that exceeds 2 is refused)"
         )
         yield Finding("contact.particle.restitution", "rebound", rebound, text)
+
+
+def _fall_speed(setup):
+    """Speed (m/s) of a fast sphere that falls from the column's top to the outlet."""
+    start = setup.filling.speed_m_s + 3 * setup.filling.speed_scatter_m_s
+    return math.sqrt(start**2 + 2 * setup.simulation.gravity_m_s2 * cases.column_top(setup))
 
 
 def _tested(setup, share):

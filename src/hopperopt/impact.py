@@ -1,8 +1,8 @@
 """What the hardest impacts of a filling do, estimated before it is simulated.
 
-Two bounds of the monitors come from the model and not from the solver: soft spheres are crushed by heavy ones
-that fall on them, and light spheres fly off heavy ones faster than anything falls. In some hundred random
-designs (see docs/robustness.md) a run comes up to 1.2 times the estimates and hardly beyond.
+Where monitors break, it is by the model's numbers: soft spheres are crushed by heavy ones that fall on them,
+a long step cannot follow a sphere that is squeezed so, and light spheres fly off heavy ones faster than
+anything falls. docs/robustness.md tells how far these estimates hold in random designs.
 """
 
 import math
@@ -15,9 +15,21 @@ def compression(fine, coarse, density, modulus, speed):
     Arguments: diameters, m; density, kg/m3; effective modulus E*, Pa; speed of the fall, m/s.
     """
     mass = math.pi / 6 * density * coarse**3
-    radius = 0.5 * fine * coarse / (fine + coarse)
-    delta = (15 / 32 * mass * speed**2 / (modulus * math.sqrt(radius))) ** 0.4
+    delta = (15 / 32 * mass * speed**2 / (modulus * math.sqrt(_effective(fine, coarse)))) ** 0.4
     return delta / (fine / 2)
+
+
+def swing(fine, coarse, density, moduli, compressed, step):
+    """Angular frequency times step of a fine sphere that is compressed between a coarse one and a wall.
+
+    A contact's stiffness is 2 E* sqrt(R* delta); the leapfrog without damping is stable up to 2. Arguments:
+    diameters, m; density, kg/m3; effective moduli with spheres and with walls, Pa; overlap over the fine
+    sphere's radius; time step, s.
+    """
+    delta = compressed * fine / 2
+    radii = _effective(fine, coarse), fine / 2
+    stiffness = sum(2 * e * math.sqrt(r * delta) for e, r in zip(moduli, radii, strict=True))
+    return step * math.sqrt(stiffness / (math.pi / 6 * density * fine**3))
 
 
 def rebound(diameters, restitution, wall_restitution):
@@ -34,3 +46,8 @@ def rebound(diameters, restitution, wall_restitution):
 
     fine, intermediate, coarse = diameters
     return max(1.0, hit(fine, coarse, 1.0), hit(fine, intermediate, hit(intermediate, coarse, 1.0)))
+
+
+def _effective(first, second):
+    """Effective radius of two spheres of these diameters."""
+    return 0.5 * first * second / (first + second)

@@ -299,10 +299,15 @@ def test_lengths_that_are_allowed_but_hardly_meant_are_a_warning(changes, key, s
         ({"particles": {"diameters_mm": [1.6, 3, 5]}}, "particles.shear_modulus_pa"),
         ({"contact": {"particle": {"restitution": 0.9}}}, "contact.particle.restitution"),
         ({"contact": {"wall": {"restitution": 0.9}}}, "contact.particle.restitution"),
+        ({"particles": {"diameters_mm": [1.5, 3, 4]}}, "particles.diameters_mm"),
+        (
+            {"simulation": {"time_step_s": 4e-5}, "wall": {"shear_modulus_pa": ".inf"}},
+            "simulation.time_step_s",
+        ),
     ],
 )
 def test_impacts_that_break_the_monitors_are_a_warning(changes, key):
-    """Soft spheres below heavy ones, and light ones that fly off them; the study itself is clear of both."""
+    """Soft spheres below heavy ones, and light ones that fly off them; the study itself is clear of all."""
     changes = {"simulation": {"time_step_s": "auto"}, **changes}
     assert [line for line in config.parse(changes).warnings() if line.startswith(key)]
     assert not [line for line in config.parse({}).warnings() if line.startswith(key)]
