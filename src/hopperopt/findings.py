@@ -186,11 +186,13 @@ def _hard_impacts(setup):
         text = f"1 : {coarse / fine:.3g}{{where}}: fine spheres may be flung off"
         text += f"; usual: at most 1 : {USUAL_SIZES} (a run with one at twice the speed of fall is refused)"
         yield Finding("particles.diameters_mm", "sizes", coarse / fine, text)
+    elastic = contact.particle.restitution > 0.8 and coarse > 1.5 * fine  # many hits of coarse ones add up
     rebound = impact.rebound(spheres.diameters, contact.particle.restitution, contact.wall.restitution)
-    if rebound > USUAL_REBOUND:
+    if rebound > USUAL_REBOUND or elastic:
         text = (
-            f"a fine sphere may rebound from coarse ones at {rebound:.2f} times the speed of free fall"
-            f"{{where}}; usual: at most {USUAL_REBOUND} (a run that exceeds 2 is refused)"
+            f"{contact.particle.restitution:g}{{where}}: fine spheres may rebound from coarse ones at "
+            f"{rebound:.2f} times the speed of free fall, or more after several hits; usual: at most "
+            f"{USUAL_REBOUND} and a restitution of 0.8 (a run that exceeds 2 is refused)"
         )
         yield Finding("contact.particle.restitution", "rebound", rebound, text)
 

@@ -38,14 +38,12 @@ class Envelope:
     def sample(self, position, gate_closed):
         """Look at positions (n, 3) by identity, m; NaN rows (spheres that left) are passed over.
 
-        Below the outlet there is no wall, so a sphere there is outside only while the gate is closed. One
-        that rebounds above the wall's top falls back: it is outside once it is farther from the axis than
-        the top.
+        Below the outlet there is no wall, so a sphere there is outside only while the gate is closed.
         """
         r, z = np.hypot(position[:, 0], position[:, 1]), position[:, 2]
         beside = (r > np.interp(z, self._z, self._r)) & (z >= self._z[0])
         below = (z < self._z[0]) if gate_closed else False
-        self._outside |= beside | below
+        self._outside |= beside | (z > self._z[-1]) | below
 
     @property
     def lost(self):

@@ -1,4 +1,4 @@
-"""What the configuration warns of before a run, against the solver: crushed fine spheres and fast rebounds."""
+"""What the configuration warns of before a run, against the solver: crushed spheres and fast rebounds."""
 
 import numpy as np
 import pytest

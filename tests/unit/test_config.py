@@ -299,6 +299,10 @@ def test_lengths_that_are_allowed_but_hardly_meant_are_a_warning(changes, key, s
         ({"particles": {"diameters_mm": [1.6, 3, 5]}}, "particles.shear_modulus_pa"),
         ({"contact": {"particle": {"restitution": 0.9}}}, "contact.particle.restitution"),
         ({"contact": {"wall": {"restitution": 0.9}}}, "contact.particle.restitution"),
+        (
+            {"contact": {"particle": {"restitution": 0.85}}, "particles": {"diameters_mm": [2, 2.5, 3.2]}},
+            "contact.particle.restitution",
+        ),
         ({"particles": {"diameters_mm": [1.5, 3, 4]}}, "particles.diameters_mm"),
         (
             {"simulation": {"time_step_s": 4e-5}, "wall": {"shear_modulus_pa": ".inf"}},
@@ -550,7 +554,7 @@ def test_any_number_can_be_a_factor():
 
 def test_case_of_the_centre():
     case = config.parse({}).simulation_case(CENTRE, "plan_centre", 1)
-    (outlet, edge, top), gate, insert = (case["walls"][name] for name in ("hopper", "gate", "insert"))
+    (outlet, edge, top, rim), gate, insert = (case["walls"][name] for name in ("hopper", "gate", "insert"))
     assert (outlet, edge, gate) == ([0.0225, 0.0], [0.05, 0.0275], [[0.0, 0.0], [0.0225, 0.0]])
     assert insert == [[0.0, 0.0296], [0.022943057454, 0.0296], [0.0, 0.062366081772]]
     count = sum(case["particles"]["counts"])
@@ -560,6 +564,8 @@ def test_case_of_the_centre():
     assert top[0] == 0.05
     rise = 0.25**2 / (2 * 9.81)  # of a particle that starts upwards at five standard deviations
     assert top[1] == pytest.approx(0.079 + column / (3.141592653589793 * 0.048**2) + 0.004 + rise + 0.02)
+    head = top[1] + 0.75**2 / (2 * 9.81)  # from where it would fall that starts downwards at five
+    assert rim == [0.05, pytest.approx(4 * head)]  # at twice the speed of fall it rises no higher
     assert json.loads(json.dumps(case)) == case
 
 

@@ -16,8 +16,7 @@ HOPPER = [[0.01, 0.0], [0.03, 0.02], [0.03, 0.1]]
         ([0.0, 0.031, 0.05], 1, 1),  # beside the cylinder
         ([0.0, 0.0, -0.001], 1, 0),  # below the outlet
         ([0.0, 0.5, -0.001], 1, 0),
-        ([0.02, 0.0, 0.15], 0, 0),  # above the open top, and falls back
-        ([0.04, 0.0, 0.15], 1, 1),  # over the wall
+        ([0.02, 0.0, 0.15], 1, 1),  # above the rim
         ([np.nan] * 3, 0, 0),  # it has left
     ],
 )
