@@ -5,8 +5,9 @@ import math
 from hopperopt import geometry
 
 MM = 1000.0
-HEADROOM = 0.020  # m of wall above all that a particle can reach
+HEADROOM = 0.020  # m of wall above the particles that start, and their first rise
 SCATTERS = 5  # standard deviations of the speed that the fastest particle has upwards
+REBOUND = 2  # times free fall: the fastest particle in a run that counts
 
 
 def simulation(setup, labels, seed):
@@ -14,7 +15,8 @@ def simulation(setup, labels, seed):
     insert, spheres = setup.insert_profile, setup.particles
     return {
         "walls": {
-            "hopper": setup.hopper.profile(_wall_top(setup)).tolist(),
+            # The rim is a length of wall of its own: contacts below it are what they are without it.
+            "hopper": [*setup.hopper.profile(_wall_top(setup)).tolist(), _rim(setup)],
             "gate": geometry.gate(setup.hopper.outlet_radius_mm / MM).tolist(),
             "insert": None if insert is None else insert.tolist(),
         },
@@ -61,7 +63,7 @@ def _column_radius(setup):
     return setup.hopper.cylinder_radius_mm / MM - setup.particles.diameters[-1] / 2
 
 
-def _column_top(setup):
+def column_top(setup):
     """Height of the column that the particles fill at the column's solid fraction."""
     sphere = math.pi / 6 * sum(diameter**3 for diameter in setup.particles.diameters) / 3
     section = math.pi * _column_radius(setup) ** 2
@@ -73,4 +75,11 @@ def _wall_top(setup):
     """Height of the wall: clear of the column's spheres and the rise of those that start upwards."""
     upwards = SCATTERS * setup.filling.speed_scatter_m_s
     rise = upwards * upwards / (2 * setup.simulation.gravity_m_s2)
-    return _column_top(setup) + setup.particles.diameters[-1] + rise + HEADROOM
+    return column_top(setup) + setup.particles.diameters[-1] + rise + HEADROOM
+
+
+def _rim(setup):
+    """Point r, z of the wall's upper end: no particle rises above it that keeps the bound of the speed."""
+    start = setup.filling.speed_m_s + SCATTERS * setup.filling.speed_scatter_m_s
+    head = _wall_top(setup) + start * start / (2 * setup.simulation.gravity_m_s2)
+    return [setup.hopper.cylinder_radius_mm / MM, round(float(REBOUND**2 * head), geometry.DECIMALS)]

@@ -6,146 +6,15 @@ Works on the models' attributes alone. A refusal or warning about designs is sai
 import difflib
 import re
 from contextlib import suppress
-from typing import NamedTuple
 
 from hopperopt import design as plans
-from hopperopt import geometry
+from hopperopt import findings
 from hopperopt.document import ConfigError, dotted_keys, mistake
 
-MM = 1000.0
 SIMULATED = {"hopper", "insert", "particles", "wall", "contact", "filling", "discharge", "simulation"}
-SMALLEST_GAP, USUAL_GAP = 2, 3  # coarse diameters between insert and wall
-USUAL_OUTLET = 5  # coarse diameters
-MOST_PARTICLES = 10_000_000
-SHORTEST_STEP, USUAL_STEP = 1e-4, 0.4  # Rayleigh times
-# The scheme is stable at the paper's step for the paper's materials: those with at most its restitution and
-# friction may take it without a warning.
-TESTED = {"step": 0.78, "restitution": 0.7, "static_friction": 0.5}
+MOST_RUNS = 10_000  # of the plan, and of the verification
 MOST_CORNERS = 256
 FOLDS = 5  # of the cross-validation
-
-
-class Finding(NamedTuple):
-    """Something about one design: a key, its badness (the largest is told), and the words for it."""
-
-    key: str
-    kind: str
-    badness: float
-    text: str
-
-
-def refusals(setup):
-    """Sentences for what makes one simulation impossible; none when all is well."""
-    return [_sentence(finding) for finding in _refused(setup)]
-
-
-def _sentence(finding, where=""):
-    return f"{finding.key}: {finding.text}".replace("{where}", where)
-
-
-def _refused(setup):
-    """Findings that make a simulation impossible: hopper, time step, insert."""
-    yield from _hopper(setup)
-    yield from _filling(setup)
-    yield from _time_step(setup)
-    if setup.insert_profile is not None:
-        yield from _insert(setup)
-
-
-def _no(key, kind, badness, value, allowed):
-    return Finding(key, kind, badness, f"{value}{{where}} is not allowed; allowed: {allowed}")
-
-
-def _hopper(setup):
-    hopper, coarse = setup.hopper, setup.particles.diameters_mm[-1]
-    if hopper.cylinder_radius_mm <= hopper.outlet_radius_mm:
-        allowed = f"more than the outlet's radius, {hopper.outlet_radius_mm:g} mm"
-        yield _no("hopper.cylinder_radius_mm", "narrow", 0, f"{hopper.cylinder_radius_mm:g}", allowed)
-    if hopper.outlet_radius_mm < coarse / 2:
-        allowed = f"at least the radius of the largest sphere, {coarse / 2:g} mm"
-        yield _no("hopper.outlet_radius_mm", "small", 0, f"{hopper.outlet_radius_mm:g}", allowed)
-
-
-def _filling(setup):
-    level, coarse = setup.filling.level_mm, setup.particles.diameters_mm[-1]
-    if level < coarse:
-        yield _no(
-            "filling.level_mm", "level", -level, f"{level:g}", f"at least a coarse diameter, {coarse:g} mm"
-        )
-    if setup.particle_count > MOST_PARTICLES:
-        count, allowed = f"filling with {setup.particle_count:.2g} particles", f"at most {MOST_PARTICLES:g}"
-        yield _no("particles.diameters_mm", "count", setup.particle_count, count, allowed)
-
-
-def _time_step(setup):
-    rayleigh = setup.particles.rayleigh_time
-    if setup.time_step > rayleigh:
-        allowed = f"at most {rayleigh:.3g} (the smallest sphere's Rayleigh time, s), or auto (a fifth of it)"
-        yield _no("simulation.time_step_s", "step", setup.time_step, f"{setup.time_step:g}", allowed)
-    elif setup.time_step < SHORTEST_STEP * rayleigh:
-        allowed = f"at least {SHORTEST_STEP * rayleigh:.3g} ({SHORTEST_STEP:g} Rayleigh times, s)"
-        yield _no("simulation.time_step_s", "short", -setup.time_step, f"{setup.time_step:g}", allowed)
-
-
-def _insert(setup):
-    profile, coarse = setup.insert_profile, setup.particles.diameters[-1]
-    key = f"insert.{setup.insert.shape}"
-    if geometry.crosses_axis(profile):
-        yield _no(key, "axis", 0, "a profile that crosses the axis", "r above 0, and 0 only at its ends")
-        return
-    if geometry.crosses_itself(profile):
-        yield _no(key, "crossing", 0, "a profile that crosses or touches itself", "a simple line")
-        return
-    if (inner := geometry.inner_radius(profile)) < coarse / 2:
-        value = f"a face that looks inwards on a circle of radius {inner * MM:.3g} mm"
-        yield _no(key, "hollow", -inner, value, f"no smaller than the largest sphere, {coarse / 2 * MM:g} mm")
-    gap = _gap(setup)
-    if gap < SMALLEST_GAP * coarse:
-        value = "an insert that touches the wall or lies beyond it"
-        if gap > 0:
-            value = f"a gap of {gap * MM:.3g} mm between insert and wall"
-        least = f"a gap of at least {SMALLEST_GAP * coarse * MM:g} mm ({SMALLEST_GAP} coarse diameters)"
-        yield _no("insert", "gap", -gap, value, least)
-
-
-def _gap(setup):
-    """Gap between insert and hopper (m), 0 for an insert that is not inside."""
-    vessel = setup.hopper.profile(setup.column_bottom)
-    inside = geometry.stays_inside(setup.insert_profile, vessel)
-    return geometry.gap(setup.insert_profile, vessel) if inside else 0.0
-
-
-def _unusual(setup):
-    """Findings that a simulation can live with."""
-    coarse, hopper = setup.particles.diameters[-1], setup.hopper
-    width = 2 * hopper.outlet_radius_mm / MM / coarse
-    if width < USUAL_OUTLET:
-        text = f"an outlet of {width:.3g} coarse diameters{{where}} may jam; usual: {USUAL_OUTLET} or more"
-        yield Finding("hopper.outlet_radius_mm", "outlet", -width, text)
-    share = setup.time_step / setup.particles.rayleigh_time
-    if share > USUAL_STEP and not _tested(setup, share):
-        text = f"{share:.2f} Rayleigh times{{where}}: an impact may gain energy; usual: at most {USUAL_STEP}"
-        yield Finding("simulation.time_step_s", "step", share, text)
-    profile = setup.insert_profile
-    if profile is None:
-        return
-    if (gap := _gap(setup)) < USUAL_GAP * coarse:
-        text = (
-            f"a gap to the wall of {gap / coarse:.2f} coarse diameters{{where}}; usual: {USUAL_GAP} or more"
-        )
-        yield Finding("insert", "gap", -gap, text)
-    apex, level = float(profile[:, 1].max()) * MM, setup.filling.level_mm
-    if apex > level:
-        text = f"the apex, at {apex:.3g} mm, stands above the bed's surface, at {level:g} mm{{where}}"
-        yield Finding("insert", "apex", apex - level, text)
-
-
-def _tested(setup, share):
-    contacts = (setup.contact.particle, setup.contact.wall)
-    return share <= TESTED["step"] and all(
-        contact.restitution <= TESTED["restitution"] and contact.static_friction <= TESTED["static_friction"]
-        for contact in contacts
-    )
 
 
 def _grouped(designs, find):
@@ -164,7 +33,7 @@ def _grouped(designs, find):
             values = ", ".join(f"{factor} {value:g}" for factor, value in labels.items())
             others = f" and {len(members) - 1} more" if len(members) > 1 else ""
             where = f" (in {name}{': ' if values else ''}{values}{others})"
-        yield _sentence(finding, where)
+        yield findings.sentence(finding, where)
 
 
 def mistakes(study, faulty):
@@ -173,6 +42,7 @@ def mistakes(study, faulty):
     rules = (
         ("keys", SIMULATED | {"factors"}, _factor_keys),
         ("plan", {"factors", "design"}, _plan),
+        ("runs", {"design", "verification", "plan", "keys"}, _runs),
         ("network", {"surrogate", "design", "plan", "keys"}, _network),
         ("explicit", {"factors", "optimise"}, _explicit),
         ("cases", {"factors", "verification"}, _cases),
@@ -189,8 +59,8 @@ def mistakes(study, faulty):
     if SIMULATED & blocked:
         return found
     if {"plan values", "case values"} & blocked:  # not all designs are known, the hopper is
-        return found + refusals(study.without_insert())
-    return found + list(_grouped(_designs(study), _refused))
+        return found + findings.refusals(study.without_insert())
+    return found + list(_grouped(_designs(study), findings.refused))
 
 
 def _factor_keys(study):
@@ -242,6 +112,15 @@ def _plan(study):
     for name, factor in study.factors.items():
         if len(factor.levels) != 5:
             yield mistake(f"factors.{name}.levels", factor.levels, "five levels with plan l25")
+
+
+def _runs(study):
+    """The plan and the verification have no more runs than Snakemake can take."""
+    for section, names in (("design", study.plan), ("verification", study.verification.cases)):
+        replicates = getattr(study, section).replicates
+        if len(names) * replicates > MOST_RUNS:
+            allowed = f"at most {MOST_RUNS // len(names)} for {len(names)} designs ({MOST_RUNS} runs)"
+            yield mistake(f"{section}.replicates", replicates, allowed)
 
 
 def _network(study):
@@ -323,7 +202,8 @@ def _plan_values(study):
 
 def _case_values(study):
     """Each value of a fixed case, or of the explicit choice, is allowed where its factor's key stands."""
-    fixed = {f"verification.cases.{name}": case for name, case in study.cases().items()}
+    fixed = {"factors (the middle levels)": plans.centre(study.levels)}
+    fixed |= {f"verification.cases.{name}": case for name, case in study.cases().items()}
     if study.optimise.select == "explicit":
         fixed["optimise.explicit"] = study.optimise.explicit
     for place, design in fixed.items():
@@ -349,10 +229,10 @@ def _designs(study):
 
 def warnings(study):
     """Sentences for what is allowed but unusual, in the designs and at the corners of the optimiser's box."""
-    found = list(_grouped(_designs(study), _unusual))
+    found = list(_grouped(_designs(study), findings.unusual))
     corners = plans.corners(study.levels) if 2 ** len(study.factors) <= MOST_CORNERS else []
     extremes = [("a corner", corner, study.with_design(corner)) for corner in corners]
-    refused = _grouped(extremes, _refused)
+    refused = _grouped(extremes, findings.refused)
     found += _narrow_plan(study)
     return found + [f"the optimiser may propose designs that are refused: {sentence}" for sentence in refused]
 

@@ -227,6 +227,9 @@ def _simulate(given: argparse.Namespace) -> None:
     chosen = {name: getattr(given, name) for name in running._fields if getattr(given, name) is not None}
     # The workflow's digest only makes Snakemake run this anew; what is recorded is the code that runs.
     case.pop("code", None)
+    from hopperopt import files
+
+    files.check_writable(given.output)  # before hours of work
     _log_heading(case)
     digest = provenance.code_digest(f"hopperopt.{SIMULATION}")
     from hopperopt.simulate import simulate
@@ -285,8 +288,8 @@ def _design(study, typed: dict[str, str]) -> dict[str, float]:
         if name not in design:
             raise ConfigError(f"--factor: {name} is not allowed; allowed: {', '.join(design)}")
         try:
-            design[name] = float(value)
-        except ValueError:
+            design[name] = Quantity().read(value)
+        except NotAllowed:
             raise ConfigError(f"{name}: {value} is not allowed; allowed: a number") from None
     for name, value in design.items():
         if not isinstance(value, int | float):  # the key holds null or a word, as auto

@@ -24,7 +24,7 @@ from pydantic import (
 from pydantic_core import core_schema
 
 from hopperopt import case as cases
-from hopperopt import checks, geometry
+from hopperopt import checks, findings, geometry
 from hopperopt import design as plans
 from hopperopt.document import (
     ConfigError,
@@ -44,7 +44,6 @@ __all__ = ["ConfigError", "Setup", "Study", "derived_case", "load", "parse"]
 MM = 1000.0  # millimetres in a metre; dividing by it rounds once, so that 22.5 mm is 0.0225 m
 CLEARANCE = 0.005  # m between what is below and the column of falling particles
 RAYLEIGH_SHARE = 0.2  # of `time_step_s: auto`
-MOST_EXPERIMENTS = 1000  # a stage gets the plan in one argument, whose length the system limits
 
 
 class Number(Quantity):
@@ -62,9 +61,9 @@ class Number(Quantity):
 
 
 Seconds = Annotated[float, Number(above=0, most=10_000)]
-Length = Annotated[float, Number(above=0, most=100_000)]
+Length = Annotated[float, Number(least=0.001, most=100_000)]  # from a micrometre
 Coordinate = Annotated[float, Number(least=-100_000, most=100_000)]
-Density = Annotated[float, Number(above=0, most=100_000)]
+Density = Annotated[float, Number(least=10, most=100_000)]
 Speed = Annotated[float, Number(least=0, most=100)]
 Friction = Annotated[float, Number(least=0, most=10)]
 Share = Annotated[float, Number(least=0, most=1)]
@@ -86,7 +85,7 @@ class Hopper(Model):
     """A conical hopper below a cylinder."""
 
     outlet_radius_mm: Length = 22.5
-    half_angle_deg: Annotated[float, Number(above=0, most=90)] = 45.0
+    half_angle_deg: Annotated[float, Number(least=1, most=90)] = 45.0
     cylinder_radius_mm: Length = 50.0
 
     @property
@@ -106,7 +105,7 @@ class Hopper(Model):
 class Cone(Model):
     """A solid cone, apex up: slope angle from the horizontal, length along the slope."""
 
-    slope_deg: Annotated[float, Number(above=0, below=90)] = 55.0
+    slope_deg: Annotated[float, Number(least=1, most=89)] = 55.0
     length_mm: Length = 40.0
 
     def profile(self):
@@ -118,7 +117,9 @@ class Profile(Model):
     """A body of one's own: points r, z (z from the insert's height), in a CSV file or typed in."""
 
     file: Annotated[str, StringConstraints(min_length=1)] | None = None
-    points_mm: tuple[tuple[Coordinate, Coordinate], ...] | None = None
+    points_mm: Annotated[
+        tuple[tuple[Coordinate, Coordinate], ...] | None, Field(min_length=2, max_length=1000)
+    ] = None
 
     def profile(self):
         """Profile above the insert's height (m)."""
@@ -151,7 +152,7 @@ class Particles(Model):
 
     diameters_mm: Annotated[tuple[Length, ...], AfterValidator(_ascending)] = (2.0, 3.0, 4.0)
     density_kg_m3: Density = 2285.0
-    shear_modulus_pa: Annotated[float, Number(above=0, most=1e13)] = 1.0e7
+    shear_modulus_pa: Annotated[float, Number(least=1000, most=1e13)] = 1.0e7
     poisson_ratio: Poisson = 0.25
 
     @property
@@ -169,7 +170,7 @@ class Particles(Model):
 class Wall(Model):
     """Material of hopper, gate and insert; an infinite modulus is a rigid wall."""
 
-    shear_modulus_pa: Annotated[float, Number(above=0, most=1e13, infinite=True)] = 2.2e7
+    shear_modulus_pa: Annotated[float, Number(least=1000, most=1e13, infinite=True)] = 2.2e7
     poisson_ratio: Poisson = 0.25
 
 
@@ -207,9 +208,9 @@ class Filling(Model):
     """How the hopper is filled: up to a level, or with a fixed number of particles."""
 
     level_mm: Length = 74.0
-    particles: Annotated[int | None, Number(least=3, most=checks.MOST_PARTICLES), AfterValidator(_thirds)] = (
-        None
-    )
+    particles: Annotated[
+        int | None, Number(least=3, most=findings.MOST_PARTICLES), AfterValidator(_thirds)
+    ] = None
     bed_solid_fraction: Annotated[float, Number(above=0, most=0.74)] = 0.55
     column_solid_fraction: Annotated[float, Number(above=0, most=0.3)] = 0.2
     speed_m_s: Speed = 0.5
@@ -230,7 +231,7 @@ class Simulation(Model):
     """Time step (`auto`: a fifth of the Rayleigh time), gravity; threads and checkpoints of one run."""
 
     time_step_s: Annotated[float | Literal["auto"], Number(above=0)] = 4.0e-5
-    gravity_m_s2: Annotated[float, Number(above=0, most=1000)] = 9.81
+    gravity_m_s2: Annotated[float, Number(least=0.001, most=1000)] = 9.81
     threads: Annotated[int, Number(least=1, most=1024)] = 1
     checkpoint_minutes: Annotated[float | None, Number(above=0, most=100_000)] = 5.0
 
@@ -293,7 +294,7 @@ class Setup(Model):
 
     def case(self, labels, seed):
         """One simulation as plain JSON values in SI; ConfigError where it cannot be simulated."""
-        if refusals := checks.refusals(self):
+        if refusals := findings.refusals(self):
             raise ConfigError("\n".join(refusals))
         return cases.simulation(self, labels, seed)
 
@@ -302,7 +303,7 @@ class Factor(Model):
     """A number of the configuration that the designs vary, and its levels."""
 
     key: str
-    levels: Annotated[tuple[Finite, ...], Field(min_length=2)]
+    levels: Annotated[tuple[Finite, ...], Field(min_length=2, max_length=plans.MOST_EXPERIMENTS)]
 
 
 def _power_of_two(count):
@@ -314,14 +315,16 @@ def _power_of_two(count):
 class Hypercube(Model):
     """Latin hypercube within the ranges of the levels."""
 
-    experiments: Annotated[int, Number(least=2, most=MOST_EXPERIMENTS)] = 25
+    experiments: Annotated[int, Number(least=2, most=plans.MOST_EXPERIMENTS)] = 25
     seed: Seed = 1
 
 
 class Sobol(Model):
     """Sobol' points within the ranges of the levels."""
 
-    experiments: Annotated[int, Number(least=2, most=MOST_EXPERIMENTS), AfterValidator(_power_of_two)] = 32
+    experiments: Annotated[
+        int, Number(least=2, most=plans.MOST_EXPERIMENTS), AfterValidator(_power_of_two)
+    ] = 32
     seed: Seed = 1
 
 
@@ -390,7 +393,7 @@ class Verification(Model):
     """The designs that are simulated anew, by name."""
 
     replicates: Count = 1
-    cases: Annotated[dict[Name, Case], Field(min_length=1)] = {
+    cases: Annotated[dict[Name, Case], Field(min_length=1, max_length=plans.MOST_EXPERIMENTS)] = {
         "selected": "selected",
         "plan_centre": "plan_centre",
         "bare": "bare",
@@ -404,7 +407,7 @@ class Figures(Model):
 
 
 def _results_dir(value):
-    if not value.strip() or set(value) & set("{}\n\\"):
+    if not value.strip() or set(value) & set("{}\\") or not value.isprintable():
         raise NotAllowed("the path of a folder, without braces or backslashes")
     return Path(value).as_posix()
 
@@ -560,7 +563,7 @@ def parse(document, directory="."):
         study, unread = _with_files(study, Path(directory))
         found += unread
         faulty |= {"insert", "design"} if unread else set()
-    found += checks.mistakes(study, faulty)
+    found += [*_results_folder(study, Path(directory)), *checks.mistakes(study, faulty)]
     if found:
         raise ConfigError("\n".join(found))
     return study
@@ -581,6 +584,18 @@ def _models(document):
     return Study.model_validate(rest), sentences(errors, Study), spoilt
 
 
+def _results_folder(study, directory):
+    """The sentence for a `results_dir` that no folder can have."""
+    path = directory / study.results_dir
+    try:
+        place = next((place for place in (path, *path.parents) if place.exists()), directory)
+    except OSError as error:
+        yield mistake("results_dir", study.results_dir, f"the path of a folder ({error.strerror})")
+        return
+    if not place.is_dir():
+        yield mistake("results_dir", study.results_dir, f"the path of a folder ({place} is a file)")
+
+
 def _with_files(study, directory):
     """The study with its CSV files read, and the sentences for those that cannot be used."""
     found, own = [], study.insert.profile
@@ -590,6 +605,8 @@ def _with_files(study, directory):
             study = study.with_values({"insert.profile.points_mm": points, "insert.profile.file": None})
         except NotAllowed as error:
             found.append(mistake("insert.profile.file", own.file, error))
+        except ConfigError as error:
+            found.append(f"{error} (from {own.file})")
     if study.design.plan == "csv":
         try:
             study._own_plan = plans.from_csv(read_text(directory / study.design.csv.file), study.levels)

@@ -15,6 +15,11 @@ from hopperopt import files, outflow
 
 # What a run that did not end well cannot tell; its counts and monitors stay, to show what went wrong.
 RESULTS = ("discharge_time", "discharge_rate", "mass_flow_index")
+# What makes a netCDF file one of a run.
+RUN = {
+    "exit_time", "diameter", "size_class", "status", "filling_level", "filling_time", "residual_count",
+    "residual_mass_fraction", "max_overlap", "max_speed_ratio", "max_energy_gain", "lost_particles", *RESULTS,
+}  # fmt: skip
 NAMED = 30  # experiments in one sentence
 # Unit of a factor by the end of its name.
 UNITS = {"_deg": "degree", "_mm": "mm", "_kg_m3": "kg m-3", "_pa": "Pa", "_m_s": "m s-1", "_s": "s"}
@@ -57,13 +62,19 @@ def gather(
 
 
 def read_runs(paths: Iterable) -> dict[tuple[str, int], xr.Dataset]:
-    """Read runs by (name, replicate), both from the file's name NAME_rep_REPLICATE.nc."""
+    """Read runs by (name, replicate), both from the file's name NAME_rep_REPLICATE.nc.
+
+    Raises files.InputError naming a file that is damaged or holds no run.
+    """
     runs = {}
     for path in map(Path, paths):
         match = re.fullmatch(r"(.+)_rep_(\d+)\.nc", path.name)
         if match is None:
             raise files.InputError(f"{path}: a run's file is named NAME_rep_REPLICATE.nc")
-        runs[match[1], int(match[2])] = files.read_netcdf(path)
+        run = files.read_netcdf(path)
+        if missing := RUN - set(run.data_vars):
+            raise files.InputError(f"{path}: is no run of a simulation: no {', '.join(sorted(missing))}")
+        runs[match[1], int(match[2])] = run
     return runs
 
 

@@ -8,7 +8,9 @@ from itertools import product
 from typing import NamedTuple
 
 from hopperopt.document import NotAllowed
+from hopperopt.quantity import Quantity
 
+MOST_EXPERIMENTS = 1000  # a stage gets the plan in one argument, whose length the system limits
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 # Columns, dimensions and variables of the study's files, which no factor may be called.
@@ -110,18 +112,28 @@ def from_csv(text, factors):
 
     Raises NotAllowed with what the file should hold.
     """
-    rows = list(csv.DictReader(io.StringIO(text), skipinitialspace=True))
     columns = ["experiment", *factors]
-    found = set(rows[0]) if rows else set()
-    missing = [column for column in columns if column not in found]
-    if missing:
-        raise NotAllowed(f"a CSV file with the columns {', '.join(columns)} and at least one row")
+    rows = _rows(text, columns)
+    if not rows:
+        raise NotAllowed(f"a CSV file with the columns {', '.join(columns)}, each once, and at least one row")
+    if len(rows) > MOST_EXPERIMENTS:
+        raise NotAllowed(f"at most {MOST_EXPERIMENTS} experiments ({len(rows)} are there)")
     experiments = [_from_row(number, row, factors) for number, row in enumerate(rows, start=2)]
     seen = [experiment.name for experiment in experiments]
     for name in seen:
         if seen.count(name) > 1:
             raise NotAllowed(f"a name for each experiment ({name} is there twice)")
     return experiments
+
+
+def _rows(text, columns):
+    """Rows of a CSV text as dicts; none where a column is missing or there twice, or it is no CSV."""
+    reader = csv.DictReader(io.StringIO(text), skipinitialspace=True)
+    try:
+        found = list(reader.fieldnames or ())
+        return list(reader) if all(found.count(column) == 1 for column in columns) else []
+    except csv.Error:
+        return []
 
 
 def _from_row(number, row, factors):
@@ -131,21 +143,21 @@ def _from_row(number, row, factors):
     design = {}
     for factor in factors:
         try:
-            design[factor] = float(row[factor])
-        except (TypeError, ValueError):
-            design[factor] = math.nan
-        if not math.isfinite(design[factor]):
-            raise NotAllowed(f"a number in every column (line {number} has {factor} {row[factor]!r})")
+            design[factor] = Quantity().read(row[factor])
+        except NotAllowed:
+            raise NotAllowed(
+                f"a number in every column (line {number} has {factor} {row[factor]!r})"
+            ) from None
     return Experiment(name, design, {})
 
 
 def points_from_csv(text):
     """Points (r, z) of a profile, from a CSV file with the columns r_mm and z_mm; raises NotAllowed."""
-    rows = list(csv.DictReader(io.StringIO(text), skipinitialspace=True))
+    read = Quantity().read
     try:
-        points = [[float(row["r_mm"]), float(row["z_mm"])] for row in rows]
-    except (KeyError, TypeError, ValueError):
+        points = [[read(row["r_mm"]), read(row["z_mm"])] for row in _rows(text, ["r_mm", "z_mm"])]
+    except NotAllowed:
         points = []
-    if len(points) < 2 or not all(map(math.isfinite, [number for point in points for number in point])):
+    if len(points) < 2:
         raise NotAllowed("a CSV file with the columns r_mm, z_mm and numbers in at least two rows")
     return points

@@ -1,10 +1,14 @@
 """Configuration documents: reading and merging files, dotted keys, and the mistakes found in them."""
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
 import yaml
+
+NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
+NOT_IN_TENS = re.compile(r"[+-]?(0[\d_]+|.*:.*)")
 
 
 class ConfigError(ValueError):
@@ -26,7 +30,8 @@ def shown(value):
         text = json.dumps(value, ensure_ascii=False, default=str)
     except (TypeError, ValueError):
         text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text[:60])
+    return text if len(text) < 60 else text[:57] + "..."
 
 
 def load(paths, overrides=None):
@@ -49,7 +54,9 @@ def _read(path):
     except UnicodeDecodeError:
         raise ConfigError(f"{path}: is not text in UTF-8") from None
     try:
-        document = json.loads(text)
+        document = json.loads(text, object_pairs_hook=_distinct)
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from None
     except ValueError:
         document = _yaml(path, text)
     if not isinstance(document, dict):
@@ -57,9 +64,20 @@ def _read(path):
     return document
 
 
+def _distinct(pairs):
+    """The dict of a JSON object's pairs; ConfigError when a key is there twice."""
+    document = {}
+    for key, value in pairs:
+        if key in document:
+            raise ConfigError(f"{key}: is there twice")
+        document[key] = value
+    return document
+
+
 def _yaml(path, text):
     try:
-        return yaml.safe_load(text)
+        document = yaml.safe_load(text)
+        found = [f"{path}, {sentence}" for sentence in _misread(yaml.compose(text, yaml.SafeLoader))]
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f", line {mark.line + 1}" if mark else ""
@@ -67,6 +85,29 @@ def _yaml(path, text):
         raise ConfigError(f"{path}{where}: is not valid YAML ({problem})") from None
     except ValueError as error:  # a date such as 2024-13-45
         raise ConfigError(f"{path}: is not valid YAML ({error})") from None
+    if found:
+        raise ConfigError("\n".join(found))
+    return document
+
+
+def _misread(node, prefix=""):
+    """Sentences where YAML silently takes what nobody means: of a key that is there twice the last value, and
+    numbers that it does not read in tens (010 is 8, 1:30 is 90)."""
+    line = f"line {node.start_mark.line + 1}: " if node else ""
+    if isinstance(node, yaml.MappingNode):
+        seen = set()
+        for key, value in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                if key.value in seen:
+                    yield f"line {key.start_mark.line + 1}: {prefix}{key.value}: is there twice"
+                seen.add(key.value)
+            yield from _misread(value, f"{prefix}{key.value}.")
+    elif isinstance(node, yaml.SequenceNode):
+        for index, value in enumerate(node.value):
+            yield from _misread(value, f"{prefix}{index}.")
+    elif isinstance(node, yaml.ScalarNode) and node.tag in NUMBERS and NOT_IN_TENS.fullmatch(node.value):
+        allowed = "a number without leading zeros and colons (YAML does not read this one in tens)"
+        yield line + mistake(prefix.rstrip("."), node.value, allowed)
 
 
 def merge(document, override):
@@ -118,11 +159,13 @@ def dotted_keys(document, prefix=""):
 
 
 def odd_keys(document, prefix=""):
-    """Mistakes for keys that are no text (YAML reads `on` and `1` as other things)."""
+    """Mistakes for keys that are no text on one line (YAML reads `on` and `1` as other things)."""
     for key, value in document.items():
         if not isinstance(key, str):
-            yield mistake(f"{prefix}{key}", key, "a key that is text (quote it)")
-        if isinstance(value, Mapping):
+            yield mistake(f"{prefix}{shown(key)}", key, "a key that is text (quote it)")
+        elif not key.isprintable():
+            yield mistake(f"{prefix}{shown(key)}", key, "a key of letters, digits and underscores")
+        elif isinstance(value, Mapping):
             yield from odd_keys(value, f"{prefix}{key}.")
 
 
@@ -141,6 +184,8 @@ def without_nulls(document, places):
 
 def read_text(path):
     """Text of a file that a configuration names; raises NotAllowed when it cannot be read."""
+    if not str(path).isprintable():
+        raise NotAllowed("the path of a file, of printable characters")
     try:
         return Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:

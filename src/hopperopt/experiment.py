@@ -239,7 +239,7 @@ class _Experiment:
 
     def discharge_rate(self):
         """Mean mass flow (kg/s) while the discharged share of the batch goes from 0.2 to 0.6; NaN if it does
-        not."""
+        not, or within one step."""
         left = np.flatnonzero(~np.isnan(self.simulation.exit_time))
         times = self.simulation.exit_time[left]
         order = np.argsort(times, kind="stable")
@@ -247,6 +247,8 @@ class _Experiment:
         if not len(share) or share[-1] < RATE_SHARE[1]:
             return np.nan
         begin, end = np.interp(RATE_SHARE, share, times[order])
+        if end - begin < self.case["time_step"]:  # a single layer that falls as one
+            return np.nan
         return float((RATE_SHARE[1] - RATE_SHARE[0]) * self.mass.sum() / (end - begin))
 
     def dataset(self):

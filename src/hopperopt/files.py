@@ -4,9 +4,11 @@ Every file appears under its name only when it is whole: it is written beside it
 and then renamed, so that an interrupted job leaves either the old file or none.
 """
 
+import errno
 import glob
 import os
 import secrets
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -65,6 +67,18 @@ def remove_leftovers(path: str | os.PathLike) -> None:
         temporary.unlink()
 
 
+def check_writable(path: str | os.PathLike) -> None:
+    """Make the folder of a file that is to be written; raises OSError, naming it, where that cannot be."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    try:
+        tempfile.TemporaryFile(dir=path.parent).close()
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path.parent)) from None
+
+
 def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     """Write a dataset as netCDF-4, arrays of numbers compressed, coordinates without a fill value.
 
@@ -87,8 +101,16 @@ def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike) -> None:
 
 
 def read_netcdf(path: str | os.PathLike) -> xr.Dataset:
-    """Read a whole netCDF file into memory and close it."""
-    return xr.load_dataset(path, engine="netcdf4")
+    """Read a whole netCDF file into memory and close it; InputError when it is damaged or no netCDF file."""
+    try:
+        return xr.load_dataset(path, engine="netcdf4")
+    except FileNotFoundError:
+        raise
+    except (OSError, RuntimeError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(
+            f"{path}: is damaged or no netCDF file ({reason}); delete it, and snakemake makes it anew"
+        ) from None
 
 
 def write_table(table: pd.DataFrame, path: str | os.PathLike) -> None:

@@ -11,6 +11,8 @@ WORDS = {
     list: "a list",
     dict: "keys with their values",
     str: "text",
+    float: "a number",
+    int: "a whole number",
     Annotated: "text",
     type(None): "null",
 }
@@ -23,14 +25,21 @@ def sentences(errors, model):
     """
     unknown = [error["loc"] for error in errors if error["type"] == "extra_forbidden"]
     misspelt = {(*path[:-1], name) for path in unknown for name in _nearest(path, model)}
-    told = [error for error in errors if error["type"] != "missing" or error["loc"] not in misspelt]
+    told = [error for error in errors if error["loc"] not in misspelt or error["type"] != "missing"]
+    told = [error for error in told if not _long_enough(error)]
     return [_sentence(error, model) for error in told]
 
 
+def _long_enough(error):
+    """Whether a list is only called too short because some of its entries are wrong, which are told."""
+    return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
+
+
 def _sentence(error, model):
-    path = tuple(part for part in error["loc"] if part != "[key]")
-    key = ".".join(str(part) for part in path) or "configuration"
-    kind, value = error["type"], error["input"]
+    path, kind, value = error["loc"], error["type"], error["input"]
+    if path[-1] == "[key]" and kind != "extra_forbidden":  # pydantic's mark of a key that is not allowed
+        path = path[:-1]
+    key = ".".join(str(part) for part in path)
     if kind == "extra_forbidden":
         return _unknown(key, value, model, path)
     if kind == "missing":
@@ -80,8 +89,7 @@ def _expected(annotation):
     if fields := _fields(annotation):
         return f"the keys {', '.join(fields)}"
     if get_origin(annotation) is Annotated:
-        described = [item.allowed for item in annotation.__metadata__ if hasattr(item, "allowed")]
-        return described[0] if described else _expected(annotation.__origin__)
+        return _expected(annotation.__origin__)
     kinds = [get_origin(kind) or kind for kind in _alternatives(annotation)]
     return " or ".join(WORDS.get(kind, "another value") for kind in kinds)
 

@@ -188,6 +188,14 @@ def test_speed_monitor_compares_with_free_fall(simulate):
     assert sim.max_speed_ratio == pytest.approx(1.7, rel=1e-3)
 
 
+def test_speed_monitor_takes_a_start_from_rest(simulate):
+    """Nothing is faster than free fall from the first step on, also where all start at rest at one height."""
+    sim = simulate([[0.0, 0.0, 0.5], [0.1, 0.0, 0.5]], 0.001, gravity=G)
+    for steps in (1, 500):
+        sim.advance(steps)
+        assert sim.max_speed_ratio == pytest.approx(1.0, abs=1e-9)
+
+
 @pytest.mark.parametrize("field", ["position", "velocity"])
 def test_what_is_no_number_stops_the_run(simulate, field):
     """A position that is NaN, or that ran away, is an error and not a result."""

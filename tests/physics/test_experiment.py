@@ -125,3 +125,12 @@ def test_cores_change_no_bit_of_what_ends_the_filling():
             heights.add(full.height())
     assert len(full.mass) > 14_000
     assert len(heights) == 1
+
+
+def test_spheres_that_fall_as_one_have_no_rate():
+    """Three equal spheres on the gate fall side by side: the mass leaves within one step."""
+    few = case(diameters=(0.003, 0.003, 0.003))
+    few["particles"]["counts"] = [1, 1, 1]
+    few["walls"]["hopper"], few["walls"]["gate"] = [[0.022, 0.0], [0.022, 0.16]], [[0.0, 0.0], [0.022, 0.0]]
+    run = experiment.run(few)
+    assert run["status"].item() == "complete" and np.isnan(run["discharge_rate"].item())

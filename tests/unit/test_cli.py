@@ -129,7 +129,8 @@ def test_the_workflows_case_runs_as_it_is(simulated):
     ("options", "said"),
     [
         (["--theta", "steep"], "theta_deg: steep is not allowed; allowed: a number"),
-        (["--theta", "nan"], "insert.cone.slope_deg"),
+        (["--theta", "nan"], "theta_deg: nan is not allowed; allowed: a number"),
+        (["--theta", "1_0"], "theta_deg: 1_0 is not allowed; allowed: a number"),
         (["--length", "90"], "insert"),
         (["--factor", "width_mm=3"], "allowed: theta_deg, length_mm, height_mm"),
         (["--factor", "theta_deg"], "allowed: NAME=VALUE"),
@@ -149,6 +150,21 @@ def test_bad_input_is_one_sentence_and_exit_status_2(tmp_path, monkeypatch, caps
     assert said in message and message.startswith("hopperopt: ")
     assert message.count("\n") == 1
     assert not (tmp_path / "run.nc").exists()
+
+
+@pytest.mark.parametrize("output", ["file/run.nc", "folder", "/proc/run.nc"])
+def test_an_output_that_cannot_be_written_is_said_before_the_work(tmp_path, monkeypatch, capsys, output):
+    def work(*_, **__):
+        raise AssertionError("the simulation has begun")
+
+    monkeypatch.setattr(provenance, "compile_solver", work)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "config.yaml").write_text("filling: {particles: 60}\n")
+    (tmp_path / "file").write_text("")
+    (tmp_path / "folder").mkdir()
+    assert cli.main(["simulate", "--no-insert", "--output", output]) == 2
+    message = capsys.readouterr().err
+    assert message.startswith(f"hopperopt: {output.removesuffix('/run.nc')}: ") and message.count("\n") == 1
 
 
 @pytest.mark.parametrize("seed", ["-1", "1.5", "one", str(2**63)])

@@ -1,5 +1,6 @@
 """The configuration: what it accepts, what it says about mistakes, and what reaches the stages."""
 
+import datetime
 import json
 import subprocess
 import sys
@@ -14,6 +15,10 @@ from hopperopt.config import ConfigError
 
 ROOT = Path(__file__).parents[2]
 CENTRE = {"theta_deg": 55, "length_mm": 40, "height_mm": 29.6}
+
+
+HEIGHTS = {"factors": {"height_mm": {"key": "insert.height_mm", "levels": [26, 28, 30, 32, 34]}}}
+LENGTHS = {"factors": {"length_mm": {"key": "insert.cone.length_mm", "levels": [30, 35, 40, 45, 50]}}}
 
 
 def nested(key, value):
@@ -77,31 +82,31 @@ def test_unknown_key_is_named_with_its_value_and_the_nearest(key, value, said):
 @pytest.mark.parametrize(
     ("key", "value", "allowed"),
     [
-        ("hopper.outlet_radius_mm", "wide", "a number above 0"),
-        ("hopper.outlet_radius_mm", True, "a number above 0"),
-        ("hopper.outlet_radius_mm", None, "a number above 0"),
-        ("hopper.outlet_radius_mm", [22.5], "a number above 0"),
-        ("hopper.outlet_radius_mm", float("nan"), "a number above 0"),
-        ("hopper.outlet_radius_mm", float("inf"), "a number above 0"),
-        ("hopper.outlet_radius_mm", ".inf", "a number above 0"),
-        ("hopper.outlet_radius_mm", 10**400, "a number above 0"),
-        ("hopper.outlet_radius_mm", "9" * 5000, "a number above 0"),
-        ("hopper.outlet_radius_mm", "22,5", "a number above 0"),
-        ("hopper.half_angle_deg", 91, "a number above 0 and at most 90"),
-        ("particles.density_kg_m3", -2285, "a number above 0"),
-        ("wall.shear_modulus_pa", "-.inf", "a number above 0 and at most 1e+13 or .inf"),
+        ("hopper.outlet_radius_mm", "wide", "a number at least 0.001"),
+        ("hopper.outlet_radius_mm", True, "a number at least 0.001"),
+        ("hopper.outlet_radius_mm", None, "a number at least 0.001"),
+        ("hopper.outlet_radius_mm", [22.5], "a number at least 0.001"),
+        ("hopper.outlet_radius_mm", float("nan"), "a number at least 0.001"),
+        ("hopper.outlet_radius_mm", float("inf"), "a number at least 0.001"),
+        ("hopper.outlet_radius_mm", ".inf", "a number at least 0.001"),
+        ("hopper.outlet_radius_mm", 10**400, "a number at least 0.001"),
+        ("hopper.outlet_radius_mm", "9" * 5000, "a number at least 0.001"),
+        ("hopper.outlet_radius_mm", "22,5", "a number at least 0.001"),
+        ("hopper.half_angle_deg", 91, "a number at least 1 and at most 90"),
+        ("particles.density_kg_m3", -2285, "a number at least 10"),
+        ("wall.shear_modulus_pa", "-.inf", "a number at least 1000 and at most 1e+13 or .inf"),
         ("wall.poisson_ratio", 0.6, "a number at least 0 and at most 0.5"),
         ("contact.particle.restitution", 1.1, "a number at least 0 and at most 1"),
         ("contact.rolling", "EDEM", "edem, cdt or none"),
         ("insert.shape", "cube", "cone, profile or none"),
         ("insert.shape", None, "cone, profile or none"),
         ("discharge.sensor_mm", 12, "a number at least -100000 and below 0"),
-        ("insert.height_mm", 1e300, "a number above 0 and at most 100000"),
+        ("insert.height_mm", 1e300, "a number at least 0.001 and at most 100000"),
         ("simulation.time_step_s", "automatic", "a number above 0 or auto"),
         ("simulation.time_step_s", True, "a number above 0 or auto"),
         ("filling.particles", 1000, "null or a multiple of 3"),
         ("filling.particles", 900.5, "a whole number at least 3 and at most 1e+07 or null"),
-        ("filling.level_mm", -1, "a number above 0"),
+        ("filling.level_mm", -1, "a number at least 0.001"),
         ("surrogate.starts", 0, "a whole number at least 1"),
         ("surrogate.starts", "many", "a whole number at least 1"),
         ("surrogate.selected_hidden_nodes", "best", "a whole number at least 1 and at most 200 or auto"),
@@ -116,6 +121,18 @@ def test_unknown_key_is_named_with_its_value_and_the_nearest(key, value, said):
         ("seed", -1, "a whole number at least 0"),
         ("results_dir", "", "the path of a folder"),
         ("results_dir", "results/{study}", "the path of a folder"),
+        ("results_dir", "results\0", "the path of a folder"),
+        ("results_dir", "9" * 400, "the path of a folder"),
+        ("insert.profile.points_mm", [], "at least 2 entries"),
+        ("insert.profile.points_mm", [[0, 0]] * 1001, "at most 1000 entries"),
+        ("design.lhs.experiments", 10**6, "at most 1000"),
+        ("filling.particles", 10**9, "at most 1e+07"),
+        ("design.replicates", 401, "at most 400 for 25 designs"),
+        ("verification.replicates", 3334, "at most 3333 for 3 designs"),
+        ("insert.cone.slope_deg", 0.96, "at least 1 and at most 89"),  # radians
+        ("particles.density_kg_m3", 2.285, "at least 10"),  # g/cm3
+        ("wall.shear_modulus_pa", 22, "at least 1000"),  # MPa
+        ("hopper.outlet_radius_mm", datetime.date(2024, 1, 1), "a number"),
         ("results_dir", 5, "text"),
         ("insert", None, "the keys shape, height_mm, cone, profile"),
         ("insert.cone", 55, "the keys slope_deg, length_mm"),
@@ -132,10 +149,29 @@ def test_value_that_is_not_allowed(key, value, allowed):
 
 def test_diameters():
     for wrong in ([2, -3, 4], [2, 3, 0], [2, float("nan"), 4], [2, "x", 4]):
-        assert "a number above 0" in only({"particles": {"diameters_mm": wrong}})
+        assert "a number at least 0.001" in only({"particles": {"diameters_mm": wrong}})
     for wrong in ([2, 3], [4, 3, 2], [1, 2, 3, 4], []):
         assert "three diameters, ascending or equal" in only({"particles": {"diameters_mm": wrong}})
     config.parse({"particles": {"diameters_mm": [3, 3, 3]}})
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "place", "allowed"),
+    [
+        ("insert.profile.points_mm", [[0, 0], [1]], "1.1: is missing", "a number"),
+        ("insert.profile.points_mm", [[0, 0], [1, 2, 3]], "1: ", "at most 2 entries"),
+        (
+            "factors.theta_deg",
+            {"key": "insert.cone.slope_deg", "levels": [50, "x"]},
+            "levels.1: ",
+            "a number",
+        ),
+        ("surrogate.hidden_nodes", ["x"], "0: ", "a whole number"),
+    ],
+)
+def test_one_wrong_entry_of_a_list_is_one_mistake(key, value, place, allowed):
+    line = only(nested(key, value))
+    assert line.startswith(f"{key}.{place}") and f"allowed: {allowed}" in line
 
 
 def test_missing_key_and_odd_keys():
@@ -217,6 +253,68 @@ def test_names_are_plain():
 def test_setup_that_cannot_be_simulated(changes, key, allowed):
     lines = [line for line in sentences(changes) if line.startswith(key)]
     assert len(lines) == 1 and allowed in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "said"),
+    [
+        ({"hopper": {"outlet_radius_mm": 0.0225}}, "hopper.outlet_radius_mm", "0.0225 m is 22.5 mm"),
+        ({"hopper": {"cylinder_radius_mm": 0.05}}, "hopper.cylinder_radius_mm", "0.05 m is 50 mm"),
+        ({"filling": {"level_mm": 0.074}}, "filling.level_mm", "0.074 m is 74 mm"),
+        ({"particles": {"diameters_mm": [0.002, 0.003, 0.004]}}, "particles.diameters_mm", "0.004 m is 4 mm"),
+        ({"insert": {"height_mm": 0.0296}, **LENGTHS}, "insert", "0.0296 m is 29.6 mm"),
+    ],
+)
+def test_metres_for_millimetres_are_one_sentence_that_asks(changes, key, said):
+    line = only(changes)
+    assert line.startswith(f"{key}: ") and line.endswith(f" (in metres? {said})")
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "said"),
+    [
+        ({"discharge": {"sensor_mm": -0.012}}, "discharge.sensor_mm", "(in metres? 0.012 m is 12 mm)"),
+        ({"insert": {"cone": {"length_mm": 0.04}}, **HEIGHTS}, "insert.cone", "0.02294 m is 22.94 mm"),
+        (
+            {
+                "particles": {"diameters_mm": [0.02, 0.03, 0.04]},
+                "filling": {"particles": 300},
+                "simulation": {"time_step_s": "auto"},
+            },
+            "hopper.outlet_radius_mm",
+            "at most 200 (all lengths in mm)",
+        ),
+    ],
+)
+def test_lengths_that_are_allowed_but_hardly_meant_are_a_warning(changes, key, said):
+    (line,) = [line for line in config.parse(changes).warnings() if line.startswith(key)]
+    assert said in line
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"particles": {"shear_modulus_pa": 4e6}}, "particles.shear_modulus_pa"),
+        ({"filling": {"speed_m_s": 5}}, "particles.shear_modulus_pa"),
+        ({"particles": {"diameters_mm": [1.6, 3, 5]}}, "particles.shear_modulus_pa"),
+        ({"contact": {"particle": {"restitution": 0.9}}}, "contact.particle.restitution"),
+        ({"contact": {"wall": {"restitution": 0.9}}}, "contact.particle.restitution"),
+        (
+            {"contact": {"particle": {"restitution": 0.85}}, "particles": {"diameters_mm": [2, 2.5, 3.2]}},
+            "contact.particle.restitution",
+        ),
+        ({"particles": {"diameters_mm": [1.5, 3, 4]}}, "particles.diameters_mm"),
+        (
+            {"simulation": {"time_step_s": 4e-5}, "wall": {"shear_modulus_pa": ".inf"}},
+            "simulation.time_step_s",
+        ),
+    ],
+)
+def test_impacts_that_break_the_monitors_are_a_warning(changes, key):
+    """Soft spheres below heavy ones, and light ones that fly off them; the study itself is clear of all."""
+    changes = {"simulation": {"time_step_s": "auto"}, **changes}
+    assert [line for line in config.parse(changes).warnings() if line.startswith(key)]
+    assert not [line for line in config.parse({}).warnings() if line.startswith(key)]
 
 
 def test_value_that_the_factors_replace_is_in_no_design():
@@ -316,6 +414,10 @@ def test_own_plan_is_read_with_the_configuration(tmp_path):
         (FOUR_ROWS + "c-1,41,31\n", "line 6 has 'c-1'"),
         (FOUR_ROWS + "c,41\n", "line 6 has height_mm None"),
         (FOUR_ROWS + "c,nan,30\n", "line 6 has length_mm 'nan'"),
+        (FOUR_ROWS + "c,1_000,30\n", "line 6 has length_mm '1_000'"),
+        ("experiment,length_mm,length_mm,height_mm\na,40,41,30\n", "each once"),
+        (f'experiment,length_mm,height_mm\na,40,"{"9" * 200_000}"\n', "each once"),
+        ("experiment,length_mm,height_mm\n" + "a,40,30\n" * 1001, "at most 1000 experiments (1001 are"),
     ],
 )
 def test_own_plan_that_cannot_be_used(tmp_path, text, said):
@@ -325,9 +427,8 @@ def test_own_plan_that_cannot_be_used(tmp_path, text, said):
 
 def test_own_plan_is_checked_like_any_other(tmp_path):
     changes = {**plan_file(tmp_path, FOUR_ROWS + "c,-5,30\n"), "factors": TWO_FACTORS}
-    assert only(changes, tmp_path) == (
-        "insert.cone.length_mm: -5.0 is not allowed; allowed: a number above 0 and at most 100000 (in c)"
-    )
+    line = only(changes, tmp_path)
+    assert line.startswith("insert.cone.length_mm: -5.0 is not allowed; ") and line.endswith(" (in c)")
     changes = {**plan_file(tmp_path, FOUR_ROWS + "bare,50,30\n"), "factors": TWO_FACTORS}
     assert only(changes, tmp_path).startswith("verification.cases.bare: ")
 
@@ -337,7 +438,7 @@ def test_own_plan_is_checked_like_any_other(tmp_path):
     [
         (three_factors(theta_deg=[60, 55, 52, 50]), "factors.theta_deg.levels", "five levels"),
         (three_factors(theta_deg=[60, 55, 55, 52, 50]), "factors.theta_deg.levels", "levels that differ"),
-        (three_factors(theta_deg=[95, 55, 54, 52, 50]), "factors.theta_deg.levels", "below 90"),
+        (three_factors(theta_deg=[95, 55, 54, 52, 50]), "factors.theta_deg.levels", "at most 89"),
         ({"factors": {"theta_deg": {"key": "insert.cone.slop_deg"}}}, "factors.theta_deg.key", "slope_deg?"),
         (
             {"factors": {"theta_deg": {"key": "insert.height_mm"}}},
@@ -395,7 +496,7 @@ def test_own_plan_is_checked_like_any_other(tmp_path):
         (
             {"verification": {"cases": {"paper": {**CENTRE, "length_mm": -1}}}},
             "verification.cases.paper",
-            "a number above 0",
+            "a number at least 0.001",
         ),
         ({"verification": {"cases": {"exp_01": "bare"}}}, "verification.cases.exp_01", "no experiment"),
     ],
@@ -453,7 +554,7 @@ def test_any_number_can_be_a_factor():
 
 def test_case_of_the_centre():
     case = config.parse({}).simulation_case(CENTRE, "plan_centre", 1)
-    (outlet, edge, top), gate, insert = (case["walls"][name] for name in ("hopper", "gate", "insert"))
+    (outlet, edge, top, rim), gate, insert = (case["walls"][name] for name in ("hopper", "gate", "insert"))
     assert (outlet, edge, gate) == ([0.0225, 0.0], [0.05, 0.0275], [[0.0, 0.0], [0.0225, 0.0]])
     assert insert == [[0.0, 0.0296], [0.022943057454, 0.0296], [0.0, 0.062366081772]]
     count = sum(case["particles"]["counts"])
@@ -463,6 +564,8 @@ def test_case_of_the_centre():
     assert top[0] == 0.05
     rise = 0.25**2 / (2 * 9.81)  # of a particle that starts upwards at five standard deviations
     assert top[1] == pytest.approx(0.079 + column / (3.141592653589793 * 0.048**2) + 0.004 + rise + 0.02)
+    head = top[1] + 0.75**2 / (2 * 9.81)  # from where it would fall that starts downwards at five
+    assert rim == [0.05, pytest.approx(4 * head)]  # at twice the speed of fall it rises no higher
     assert json.loads(json.dumps(case)) == case
 
 
@@ -537,7 +640,7 @@ def test_bare_hopper_has_nothing_of_an_insert():
         ("verification.replicates", 3),
         ("design.replicates", 3),
         ("discharge.incomplete", "drop"),
-        ("simulation.threads", 2),
+        ("simulation.threads", 4),
         ("simulation.checkpoint_minutes", None),
         ("insert.profile.file", "unused.csv"),
         ("insert.height_mm", 30),
@@ -670,6 +773,74 @@ def test_files_are_read_as_snakemake_reads_them(tmp_path):
         update_config(expected, load_configfile(path))
     assert config.load(paths) == expected
     assert config.load(paths, {"seed": 3})["seed"] == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("seed: 1\nfilling: {level_mm: 74}\nseed: 2\n", "line 3: seed: is there twice"),
+        (
+            "filling:\n  level_mm: 70\n  particles: 60\n  level_mm: 74\n",
+            "line 4: filling.level_mm: is there twice",
+        ),
+        ('{"filling": {"level_mm": 70, "level_mm": 74}}', "level_mm: is there twice"),
+        ("hopper: {outlet_radius_mm: 010}\n", 'line 1: hopper.outlet_radius_mm: "010" is not allowed'),
+        ("factors:\n  a: {key: k, levels: [1, 1:30]}\n", 'line 2: factors.a.levels.1: "1:30" is not allowed'),
+        ("discharge: {time_limit_s: 1:30.5}\n", '"1:30.5" is not allowed'),
+    ],
+)
+def test_what_yaml_takes_silently_is_said(tmp_path, text, said):
+    """Of two equal keys the last counts, 010 is 8 and 1:30 is 90: nobody means that."""
+    (tmp_path / "config.yaml").write_text(text)
+    with pytest.raises(ConfigError) as refused:
+        config.load([tmp_path / "config.yaml"])
+    assert said in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_what_yaml_reads_as_something_else(tmp_path):
+    """Text, booleans and dates in a number's place; underscores and signs are plain."""
+    (tmp_path / "a.yaml").write_text(
+        "filling: {particles: 1_200}\nsimulation: {time_step_s: 2e-5}\nseed: +7\n"
+    )
+    study = config.parse(config.load([tmp_path / "a.yaml"]))
+    assert (study.filling.particles, study.time_step, study.seed) == (1200, 2e-5, 7)
+    (tmp_path / "b.yaml").write_text("seed: yes\nfigures: {dpi: 2024-01-01}\non: 1\n")
+    with pytest.raises(ConfigError) as refused:
+        config.parse(config.load([tmp_path / "b.yaml"]))
+    assert "quote it" in str(refused.value)
+    (tmp_path / "c.yaml").write_text("seed: yes\nfigures: {dpi: 2024-01-01}\n")
+    lines = sentences(config.load([tmp_path / "c.yaml"]))
+    assert [line.partition(" is not")[0] for line in lines] == ["seed: true", 'figures.dpi: "2024-01-01"']
+
+
+def test_keys_and_values_stay_on_their_line():
+    """Whatever stands in a key or a value: one mistake is one line that can be printed."""
+    line = only({"a\nb": 1})
+    assert line.startswith('"a\\nb": ') and "letters" in line
+    for value in ("a\nb", "\ud800", "\x1b[31m"):
+        assert only({"seed": value}).isprintable()
+
+
+def test_file_names_that_no_file_can_have(tmp_path):
+    for name in ("plan\0.csv", "9" * 400, "."):
+        line = only({"design": {"plan": "csv", "csv": {"file": name}}}, tmp_path)
+        assert line.startswith("design.csv.file: ")
+
+
+def test_file_in_the_place_of_the_results_folder(tmp_path):
+    (tmp_path / "results").write_text("")
+    for path in ("results", "results/pilot"):
+        line = only({"results_dir": path}, tmp_path)
+        assert line.startswith(f'results_dir: "{path}"') and line.endswith("results is a file)")
+
+
+def test_middle_levels_are_a_design_that_is_allowed():
+    """The optimum's runs are planned with them: what is not allowed there is said before anything runs."""
+    factors = {"count": {"key": "filling.particles", "levels": [60, 63]}}
+    lines = sentences(
+        {"factors": factors, "verification": {"cases": {"bare": "bare"}}, "design": {"plan": "lhs"}}
+    )
+    assert any(line.startswith("factors (the middle levels): filling.particles: 61.5 ") for line in lines)
 
 
 @pytest.mark.parametrize("text", ["a: [1", "- 1\n- 2", "", "a: 1\n\tb: 2", "d: 2024-13-45", "a: &a {b: *a}"])

@@ -136,3 +136,17 @@ def test_a_missing_run_is_named(study):
     (study / "exp_100_rep_2.nc").unlink()
     with pytest.raises(files.InputError, match="exp_100_rep_2"):
         gather(study)
+
+
+def test_a_damaged_file_among_the_runs_is_named(study):
+    path = study / "exp_02_rep_1.nc"
+    path.write_bytes(path.read_bytes()[:2000])
+    with pytest.raises(files.InputError, match=r"exp_02_rep_1\.nc: is damaged .* delete it"):
+        gather(study)
+    assert not (study / "dataset.nc").exists()
+
+
+def test_a_file_that_is_no_run_is_named(study, make_run):
+    files.write_netcdf(make_run().drop_vars(["status", "exit_time"]), study / "exp_02_rep_1.nc")
+    with pytest.raises(files.InputError, match=r"exp_02_rep_1\.nc: is no run .* exit_time, status"):
+        gather(study)

@@ -71,3 +71,38 @@ def test_table_has_no_index_and_keeps_empty_cells(tmp_path):
     )
     assert path.read_text() == "case,predicted_J\nbare,\nselected,0.0123456789\n"
     assert files.read_table(path)["predicted_J"].isna().tolist() == [True, False]
+
+
+def _overwritten(whole):
+    """The middle of a file lost, its length kept: metadata are whole, compressed arrays are not."""
+    middle = len(whole) // 2
+    return whole[:middle] + bytes(2000) + whole[middle + 2000 :]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [lambda whole: b"", lambda whole: b"no netCDF", lambda whole: whole[: len(whole) // 2], _overwritten],
+)
+def test_damaged_netcdf_is_named_with_what_to_do(tmp_path, damage):
+    path = tmp_path / "exp_03_rep_1.nc"
+    noise = np.random.default_rng(0).random(10_000)
+    files.write_netcdf(xr.Dataset({"exit_time": ("particle", noise)}), path)
+    path.write_bytes(damage(path.read_bytes()))
+    with pytest.raises(files.InputError) as refused:
+        files.read_netcdf(path)
+    said = str(refused.value)
+    assert said.startswith(f"{path}: is damaged") and "delete it, and snakemake makes it anew" in said
+
+
+def test_place_that_cannot_be_written_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    for path, place in (
+        (tmp_path / "file" / "run.nc", "file"),
+        (tmp_path / "file" / "deep" / "run.nc", "file"),
+        (tmp_path, tmp_path.name),
+        ("/proc/run.nc", "/proc"),  # read-only, also for root
+    ):
+        with pytest.raises(OSError, match=place):
+            files.check_writable(path)
+    files.check_writable(tmp_path / "new" / "run.nc")
+    assert list((tmp_path / "new").iterdir()) == []

@@ -113,6 +113,7 @@ def test_the_report_holds_tables_and_figures(finished, tmp_path):
     [
         ("filling: {particels: 60}", "filling.particels"),
         ("factors: {length_mm: {levels: [90, 45, 40, 35, 30]}}", "length_mm"),
+        ("seed: 1\nhopper: {}\nseed: 2", "config.yaml, line 3: seed: is there twice"),
     ],
 )
 def test_a_mistake_is_a_sentence_while_the_workflow_is_read(new_study, tmp_path, text, said):

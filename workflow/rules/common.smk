@@ -16,6 +16,8 @@ from hopperopt import cli, provenance
 from hopperopt import config as configuration
 
 try:
+    # Snakemake has read these files, and says nothing of keys that are there twice and of numbers like 010.
+    configuration.load(workflow.configfiles)
     STUDY = configuration.parse(config, Path.cwd())
 except configuration.ConfigError as error:
     raise WorkflowError(f"the configuration cannot be used:\n{error}") from None

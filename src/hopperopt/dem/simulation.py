@@ -79,11 +79,13 @@ class Simulation:
         collect_overlaps(self.chunks, self.monitors)
         self.laws = Laws(pair_law, wall_law)
         largest = float(self.spheres.radius.max())
-        speed2 = (self.spheres.velocity**2).sum(axis=1)
         gravity = np.asarray(gravity, dtype=np.float64)
+        gravity = gravity if gravity.shape == (3,) else np.array([0.0, 0.0, -float(gravity)])
+        # Half a step after the velocities, at the time of the positions: a start from rest falls, too.
+        speed2 = ((self.spheres.velocity + 0.5 * time_step * gravity) ** 2).sum(axis=1)
         self.settings = Settings(
             time_step=float(time_step),
-            gravity=gravity if gravity.shape == (3,) else np.array([0.0, 0.0, -float(gravity)]),
+            gravity=gravity,
             rolling=ROLLING[rolling],
             skin=SKIN * largest,
             horizon=HORIZON_STEPS * float(time_step),
