@@ -118,7 +118,7 @@ def test_explosion_is_reported_by_the_monitors():
 
 def test_cores_change_no_bit_of_what_ends_the_filling():
     """The centre of mass of the study's batch, large enough for BLAS to share a product among the cores."""
-    full = experiment._Experiment(config.parse({}).simulation_case(None, "full", 1), None, 1)
+    full = experiment._Experiment(config.parse({}).simulation_case(None, "full", 1), None, 1, None)
     heights = set()
     for threads in (1, 2):
         with threadpool_limits(threads, user_api="blas"):

@@ -29,9 +29,6 @@ DESIGNS = dict(STUDY.experiments())
 EXPERIMENTS = list(DESIGNS)
 REPLICATES = range(1, STUDY.design.replicates + 1)
 CASES = STUDY.cases()
-# In the simulations' commands, and no part of what these depend on.
-STATE_DIR = STUDY.state_dir
-CHECKPOINT_MINUTES = json.dumps(STUDY.simulation.checkpoint_minutes)
 
 
 def result(path):
@@ -112,6 +109,12 @@ def experiment_params(wildcards):
 def verification_params(wildcards):
     """Parameters of a simulation of the verification."""
     return as_json(verification_case(wildcards), cli.SIMULATION)
+
+
+def running(wildcards, threads):
+    """Options of how a simulation runs, which rerun nothing: Snakemake compares no parameter made of `threads`."""
+    minutes = json.dumps(STUDY.simulation.checkpoint_minutes)
+    return ["--threads", str(threads), "--state-dir", STUDY.state_dir, "--checkpoint-minutes", minutes]
 
 
 def simulation_resources():

@@ -8,9 +8,10 @@ rule simulate:
         result("logs/simulate/{experiment}_rep_{replicate}.tsv")
     params:
         case=experiment_params,
+        running=running,
     threads: STUDY.simulation.threads
     resources:
         **simulation_resources(),
     shell:
-        "python -m hopperopt simulate --case {params.case:q} --threads {threads} --state-dir {STATE_DIR:q} "
-        "--checkpoint-minutes {CHECKPOINT_MINUTES} --output {output:q} > {log:q} 2>&1"
+        "python -m hopperopt simulate --case {params.case:q} {params.running:q} "
+        "--output {output:q} > {log:q} 2>&1"

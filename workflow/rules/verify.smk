@@ -10,13 +10,13 @@ rule verify_simulate:
         result("logs/verify_simulate/{case}_rep_{replicate}.tsv")
     params:
         case=verification_params,
+        running=running,
     threads: STUDY.simulation.threads
     resources:
         **simulation_resources(),
     shell:
         "python -m hopperopt simulate --case {params.case:q} --design {input.design:q} "
-        "--threads {threads} --state-dir {STATE_DIR:q} --checkpoint-minutes {CHECKPOINT_MINUTES} "
-        "--output {output:q} > {log:q} 2>&1"
+        "{params.running:q} --output {output:q} > {log:q} 2>&1"
 
 
 rule verify:
