@@ -116,11 +116,15 @@ def _plan(study):
 
 def _runs(study):
     """The plan and the verification have no more runs than Snakemake can take."""
-    for section, names in (("design", study.plan), ("verification", study.verification.cases)):
-        replicates = getattr(study, section).replicates
-        if len(names) * replicates > MOST_RUNS:
-            allowed = f"at most {MOST_RUNS // len(names)} for {len(names)} designs ({MOST_RUNS} runs)"
-            yield mistake(f"{section}.replicates", replicates, allowed)
+    verification = study.verification
+    numbers = {"design.replicates": (study.design.replicates, study.plan)}
+    numbers["verification.replicates"] = (verification.replicates, verification.cases)
+    for name, replicates in verification.replicates_of.items():
+        numbers[f"verification.replicates_of.{name}"] = (replicates, verification.cases)
+    for key, (replicates, designs) in numbers.items():
+        if len(designs) * replicates > MOST_RUNS:
+            allowed = f"at most {MOST_RUNS // len(designs)} for {len(designs)} designs ({MOST_RUNS} runs)"
+            yield mistake(key, replicates, allowed)
 
 
 def _network(study):
@@ -184,11 +188,18 @@ def _cases(study):
 
 
 def _names(study):
-    """No case bears the name of an experiment, whose seeds it would share."""
-    taken = {name for name, _ in study.experiments()}
-    for name in study.verification.cases:
+    """No case bears the name of an experiment, whose seeds it would share, or of what another case is."""
+    verification, taken = study.verification, {name for name, _ in study.experiments()}
+    for name, case in verification.cases.items():
         if name in taken or re.fullmatch(r"exp_\d+", name):
             yield mistake(f"verification.cases.{name}", name, "a name that no experiment has")
+        elif name in verification.words and case != name:
+            yield mistake(f"verification.cases.{name}", case, f"{name} (a case of this name is that)")
+    # The number of runs of a word is no mistake where its case is left out.
+    known = dict.fromkeys([*verification.cases, *verification.words])
+    for name in verification.replicates_of:
+        if name not in known:
+            yield mistake(f"verification.replicates_of.{name}", name, ", ".join(known))
 
 
 def _plan_values(study):
@@ -220,7 +231,7 @@ def _designs(study):
     designs = dict(study.experiments())
     if study.optimise.select == "explicit":
         designs["optimise.explicit"] = study.optimise.explicit
-    designs |= {name: case for name, case in study.cases().items() if case != "derived"}
+    designs |= {name: case for name, case in study.cases().items() if not isinstance(case, str)}
     return [
         (name, design or {}, study.without_insert() if design is None else study.with_design(design))
         for name, design in designs.items()

@@ -42,7 +42,11 @@ class Stage(NamedTuple):
 STAGES = {
     "design": Stage("dataset", "write_plan", (), ("design.csv",), "write the plan's table"),
     "gather": Stage(
-        "dataset", "gather", ("design", "simulations*"), ("dataset.nc", "runs.csv"), "gather the plan's runs"
+        "dataset",
+        "gather",
+        ("design", "simulations*"),
+        ("dataset.nc", "runs.csv", "designs.csv"),
+        "gather the plan's runs",
     ),
     "filter": Stage(
         "surrogate.targets", "filter_targets", ("dataset",), ("training.nc",), "clip and split the targets"
@@ -58,7 +62,11 @@ STAGES = {
         "search the best designs and select one",
     ),
     "verify": Stage(
-        "verify", "verify", ("simulations*", "network"), ("summary.csv",), "compare prediction and simulation"
+        "verify",
+        "verify",
+        ("simulations*", "network", "designs"),
+        ("verdict.csv", "glance.csv"),
+        "judge the cases simulated anew",
     ),
 }
 SIMULATION = "experiment"
@@ -68,7 +76,8 @@ FIGURES = {
     "curves": ("dataset",),
     "fit": ("training", "network"),
     "verification": ("simulations*", "network"),
-    "front": ("front", "dataset", "summary"),
+    "verdict": ("verdict", "designs"),
+    "front": ("front", "dataset", "verdict"),
     "errors": ("errors",),
 }
 
@@ -216,7 +225,7 @@ def _add_simulate(command: argparse.ArgumentParser) -> None:
         help="where the state is saved (default: .state in the study's folder of results)",
     )
     command.add_argument("--case", type=_json, metavar="JSON", help=argparse.SUPPRESS)
-    command.add_argument("--design", nargs="*", default=[], metavar="YAML", help=argparse.SUPPRESS)
+    command.add_argument("--design", nargs="*", default=[], metavar="FILE", help=argparse.SUPPRESS)
     command.add_argument("--output", type=Path, required=True, metavar="FILE", help="netCDF file to write")
     command.set_defaults(action=_simulate)
 
@@ -252,9 +261,9 @@ def _case(given: argparse.Namespace) -> tuple[dict, Running]:
     from hopperopt import config
 
     if given.case is not None:
-        from hopperopt import files
+        from hopperopt import verify
 
-        design = files.read_yaml(given.design[0])["design"]
+        design = verify.found_design(given.case["found"], given.design[0], given.case["keys"])
         return config.derived_case(given.case, design), Running()
     study = config.parse(config.load(given.configfile), Path.cwd())
     typed = _typed_factors(given)

@@ -338,7 +338,7 @@ class Design(Model):
     """Which designs are simulated, and how often."""
 
     plan: Literal["l25", "lhs", "sobol", "csv"] = "l25"
-    replicates: Count = 1
+    replicates: Count = 3
     lhs: Hypercube = Hypercube()
     sobol: Sobol = Sobol()
     csv: OwnPlan = OwnPlan()
@@ -369,8 +369,9 @@ class Optimise(Model):
     explicit: dict[Name, Finite] = {}
 
 
+PAPER = {"theta_deg": 56.7, "length_mm": 32.4, "height_mm": 33.0}  # the optimum of Yu and Saxén
 FIXED = ("plan_centre", "bare")
-DERIVED = ("selected",)
+DERIVED = ("selected", "best_f", "best_i", "plan_best")
 
 
 def _read_case(value):
@@ -390,14 +391,24 @@ Case = Annotated[str | dict[str, float], BeforeValidator(_read_case)]
 
 
 class Verification(Model):
-    """The designs that are simulated anew, by name."""
+    """The designs that are simulated anew, by name, and how often."""
 
-    replicates: Count = 1
+    replicates: Count = 10
+    replicates_of: dict[Name, Count] = {"selected": 20, "plan_best": 20}
     cases: Annotated[dict[Name, Case], Field(min_length=1, max_length=plans.MOST_EXPERIMENTS)] = {
-        "selected": "selected",
-        "plan_centre": "plan_centre",
+        **{word: word for word in (*DERIVED, "plan_centre")},
+        "paper": PAPER,
         "bare": "bare",
     }
+
+    @property
+    def words(self):
+        """What a case may be, beside a design."""
+        return (*DERIVED, *FIXED)
+
+    def replicates_in(self, name):
+        """Number of runs of a case."""
+        return self.replicates_of.get(name, self.replicates)
 
 
 class Figures(Model):
@@ -470,10 +481,10 @@ class Study(Setup):
         return [(experiment.name, experiment.design) for experiment in self.plan]
 
     def cases(self):
-        """Verification cases by name: "derived" (from the optimum), a design, or None (no insert)."""
-        meaning = {"selected": "derived", "plan_centre": plans.centre(self.levels), "bare": None}
+        """Verification cases by name: a word of DERIVED (to be found), a design, or None (no insert)."""
+        meaning = {"plan_centre": plans.centre(self.levels), "bare": None}
         return {
-            name: meaning[case] if isinstance(case, str) else case
+            name: meaning.get(case, case) if isinstance(case, str) else case
             for name, case in self.verification.cases.items()
         }
 
@@ -531,7 +542,13 @@ STAGES = {
         "bounds": {name: list(plans.bounds(levels)) for name, levels in study.levels.items()},
         "centre": plans.centre(study.levels),
     },
-    "verify": lambda study: {"cases": list(study.cases()), "incomplete": study.discharge.incomplete},
+    "verify": lambda study: {
+        "cases": [
+            [name, case if isinstance(case, str) else "design"]
+            for name, case in study.verification.cases.items()
+        ],
+        "incomplete": study.discharge.incomplete,
+    },
     "figures": lambda study: study.figures.model_dump(),
 }
 
@@ -557,8 +574,10 @@ def parse(document, directory="."):
     """
     if found := list(odd_keys(document)):
         raise ConfigError("\n".join(found))
-    document = without_nulls(document, ("factors", "optimise.explicit", "verification.cases"))
+    entries = ("factors", "optimise.explicit", "verification.cases", "verification.replicates_of")
+    document = without_nulls(document, entries)
     study, found, faulty = _models(document)
+    study = _with_its_cases(study)
     if not {"insert", "design", "factors"} & faulty:
         study, unread = _with_files(study, Path(directory))
         found += unread
@@ -567,6 +586,15 @@ def parse(document, directory="."):
     if found:
         raise ConfigError("\n".join(found))
     return study
+
+
+def _with_its_cases(study):
+    """The study without the default case that is a design of the paper's, where its factors are others."""
+    verification = study.verification
+    if "cases" in verification.model_fields_set or set(study.factors) == set(PAPER):
+        return study
+    cases = {name: case for name, case in verification.cases.items() if case != PAPER}
+    return study.model_copy(update={"verification": verification.model_copy(update={"cases": cases})})
 
 
 def _errors(error):

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from hopperopt import files, outflow
+from hopperopt import files, outflow, uncertainty
 
 # What a run that did not end well cannot tell; its counts and monitors stay, to show what went wrong.
 RESULTS = ("discharge_time", "discharge_rate", "mass_flow_index")
@@ -20,6 +20,7 @@ RUN = {
     "exit_time", "diameter", "size_class", "status", "filling_level", "filling_time", "residual_count",
     "residual_mass_fraction", "max_overlap", "max_speed_ratio", "max_energy_gain", "lost_particles", *RESULTS,
 }  # fmt: skip
+RANKING = outflow.SIZE_CLASSES[:2]  # whose objectives rank the designs
 NAMED = 30  # experiments in one sentence
 # Unit of a factor by the end of its name.
 UNITS = {"_deg": "degree", "_mm": "mm", "_kg_m3": "kg m-3", "_pa": "Pa", "_m_s": "m s-1", "_s": "s"}
@@ -41,24 +42,26 @@ def write_plan(params: Mapping, output: str | os.PathLike) -> None:
 
 
 def gather(
-    params: Mapping, design: str | os.PathLike, simulations: Iterable, output: str, table: str
+    params: Mapping, design: str | os.PathLike, simulations: Iterable, output: str, runs: str, designs: str
 ) -> None:
-    """Write the plan's dataset (netCDF) and a table of its runs (CSV).
+    """Write the plan's dataset (netCDF), a table of its runs and one of its designs (CSV).
 
     params: `factors`, names of columns of the table `design`; `incomplete`, refuse or drop.
     simulations: the runs' files, named EXPERIMENT_rep_REPLICATE.nc. Raises files.InputError naming the runs
-    that did not end well, unless they are to be dropped: then they are NaN in the dataset.
+    that did not end well, unless they are to be dropped: then they are NaN in the dataset (InputError if none
+    is left).
     """
-    runs = read_runs(simulations)
-    if missed := missed_levels(runs):
+    simulated = read_runs(simulations)
+    if missed := missed_levels(simulated):
         logging.warning(missed)
-    unusable = unusable_runs(runs)
+    unusable = unusable_runs(simulated)
     if unusable and params["incomplete"] != "drop":
         raise files.InputError(refusal(unusable))
     plan = files.read_table(design).set_index("experiment")[list(params["factors"])]
-    dataset = assemble(plan, runs, unusable)
+    dataset = assemble(plan, simulated, unusable)
     files.write_netcdf(dataset, output)
-    files.write_table(table_of_runs(dataset), table)
+    files.write_table(table_of_runs(dataset), runs)
+    files.write_table(ranked_designs(dataset), designs)
 
 
 def read_runs(paths: Iterable) -> dict[tuple[str, int], xr.Dataset]:
@@ -135,16 +138,17 @@ def assemble(plan: pd.DataFrame, runs: Mapping, unusable: Mapping) -> xr.Dataset
     missing = [f"{e}_rep_{r}" for e in plan.index for r in replicates if (e, r) not in runs]
     if missing:
         raise files.InputError(f"no run of {', '.join(missing)}")
-    target = _common_target(runs)
+    target = common_target(runs)
     rows = []
     for experiment in plan.index:
         row = [_data_point(runs[experiment, r], target, (experiment, r) in unusable) for r in replicates]
         rows.append(xr.concat(row, "replicate", coords="minimal", compat="override", join="exact"))
     dataset = xr.concat(rows, "experiment", coords="minimal", compat="override", join="exact")
-    return _described(dataset.assign_coords(_coordinates(plan, replicates, target)), unusable)
+    dataset = dataset.assign_coords(_coordinates(plan, replicates, target))
+    return _described(dataset.assign(_of_designs(dataset)), unusable)
 
 
-def _common_target(runs: Mapping) -> np.ndarray:
+def common_target(runs: Mapping) -> np.ndarray:
     """Mass fractions m_k0 of the batch, which must be those of every run."""
     targets = {
         key: outflow.batch_fractions(run["diameter"].values, run["size_class"].values)
@@ -172,6 +176,31 @@ def _data_point(run: xr.Dataset, target: np.ndarray, unusable: bool) -> xr.Datas
         counting_variance=(("size_class", "M"), variance),
         J=("size_class", outflow.objective(fraction, target)),
         U=("size_class", outflow.corrected_square(fraction, target, variance)),
+    )
+
+
+def _of_designs(dataset: xr.Dataset) -> dict:
+    """Variables of whole designs: the noise between their replicates, and U of their mean curves."""
+    runs, target = replicates(dataset), dataset["target_fraction"].values
+    pooled = uncertainty.pooled_variance(runs)
+    U = uncertainty.estimate(runs, target, pooled)
+    counted = uncertainty.estimate(runs, target, runs.counting)
+    dimensions = ("experiment", "size_class", "M")
+    return {
+        "runs": ("experiment", runs.number[:, 0, 0]),
+        "scatter_variance": (dimensions, runs.scatter),
+        "pooled_variance": (dimensions[1:], pooled),
+        "U_design": (dimensions[:2], U.square),
+        "U_design_variance": (dimensions[:2], U.variance),
+        "U_design_counting_variance": (dimensions[:2], counted.variance),
+    }
+
+
+def replicates(dataset: xr.Dataset) -> uncertainty.Runs:
+    """The replicates of each design joined; arrays (experiment, size class, M)."""
+    order = ("experiment", "replicate", "size_class", "M")
+    return uncertainty.of_runs(
+        *(dataset[name].transpose(*order).values for name in ("mass_fraction", "counting_variance"))
     )
 
 
@@ -203,6 +232,12 @@ def _described(dataset: xr.Dataset, unusable: Mapping) -> xr.Dataset:
         "counting_variance": "counting variance of the mass fraction in one run",
         "J": "raw objective, rms over M of the deviation from the batch",
         "U": "objective squared, less the counting variance; may be negative",
+        "runs": "number of replicates that are data points",
+        "scatter_variance": "variance of the mass fraction between the replicates",
+        "pooled_variance": "variance of the mass fraction between replicates, pooled over the experiments",
+        "U_design": "objective squared of the replicates' mean, less its noise; may be negative",
+        "U_design_variance": "variance of U_design, from the pooled variance between replicates",
+        "U_design_counting_variance": "variance of U_design, were counting the only noise",
     }
     for name, text in names.items():
         dataset[name].attrs = {"long_name": text, "units": "1"}
@@ -228,6 +263,27 @@ def table_of_runs(dataset: xr.Dataset) -> pd.DataFrame:
     for name in dataset["size_class"].values:
         table[f"J_{name}"] = stacked["J"].sel(size_class=name).values
     return pd.DataFrame(table)
+
+
+def ranked_designs(dataset: xr.Dataset) -> pd.DataFrame:
+    """One row per design, the least segregating first: factors, number of runs, J with its interval of 90 %.
+
+    J is sign(U) sqrt|U| of the replicates' mean. `rank` goes by U_f / mean U_f + U_i / mean U_i; designs
+    without a run come last. Raises files.InputError if no design has one.
+    """
+    table = pd.DataFrame({name: dataset[name].values for name in ("experiment", *_factors(dataset), "runs")})
+    if not table["runs"].any():
+        raise files.InputError("no experiment has a complete run: there is nothing to rank")
+    score = 0.0
+    for name in RANKING:
+        data = dataset.sel(size_class=name)
+        U = uncertainty.Estimate(data["U_design"].values, data["U_design_variance"].values)
+        for end, square in zip(("", "_low", "_high"), (U.square, *U.interval()), strict=True):
+            table[name + end] = outflow.signed_root(square)
+        # A mean below zero, where noise is all there is, must not turn the order round.
+        score = score + U.square / abs(np.nanmean(U.square))
+    table["rank"] = pd.Series(score).rank(method="first").astype("Int64")
+    return table.sort_values("rank")
 
 
 def _factors(dataset: xr.Dataset) -> list[str]:

@@ -21,7 +21,9 @@ RESERVED = {
     "counting_variance", "particle_count", "filling_level", "filling_time", "settled", "discharge_time",
     "discharge_time_s", "discharge_rate", "mass_flow_index", "max_overlap", "max_speed_ratio",
     "max_energy_gain", "lost_particles", "residual_count", "residual_mass_fraction", "step_count",
-    "filling_level_mm", "moved", "clip_low", "clip_high", "target_clipped",
+    "filling_level_mm", "moved", "clip_low", "clip_high", "target_clipped", "runs", "scatter_variance",
+    "pooled_variance", "rank", "n", "against_bare", "fine", "fine_low", "fine_high", "intermediate",
+    "intermediate_low", "intermediate_high",
 }
 # fmt: on
 

@@ -1,75 +1,118 @@
-"""Prediction against simulation, per verification case and objective."""
+"""The stage `verify`: the cases simulated anew, beside their predictions and against the bare hopper."""
 
 import json
+import os
 from collections.abc import Iterable, Mapping
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from hopperopt import dataset, files, outflow
-from hopperopt.surrogate import features, prediction
+from hopperopt import dataset, files, outflow, uncertainty
+from hopperopt.outflow import SIZE_CLASSES
+from hopperopt.surrogate import prediction
+from hopperopt.uncertainty import SIGMAS, Estimate
+from hopperopt.verdict import COLUMNS, NONE, Case, Prediction, judge
+
+PLAN_BEST = "plan_best"
 
 
-def verify(params: Mapping, simulations: Iterable, network: str, output: str) -> None:
-    """Write the table of predicted and simulated objectives: a row per case and objective.
+def verify(
+    params: Mapping, simulations: Iterable, network: str, designs: str, verdict: str, glance: str
+) -> None:
+    """Write the verdict, numbers for a row per case and objective, and the same at a glance, in words.
 
-    params: `cases`, their names in order; `incomplete`, refuse or drop. simulations: the cases' runs, named
-    CASE_rep_REPLICATE.nc. Raises files.InputError naming the runs that did not end well, unless they are to
-    be dropped; a case without any run left has empty cells.
+    params: `cases`, pairs of name and kind in order; `incomplete`, refuse or drop. simulations: the cases'
+    runs, named CASE_rep_REPLICATE.nc; network: path of network.nc; designs: path of designs.csv. Raises
+    files.InputError naming the runs that did not end well, unless they are to be dropped; a case without any
+    run left has empty cells.
     """
     runs = dataset.read_runs(simulations)
     unusable = dataset.unusable_runs(runs)
     if unusable and params["incomplete"] != "drop":
         raise files.InputError(dataset.refusal(unusable))
     predictor = prediction.load(network)
-    rows = []
-    for case in params["cases"]:
-        replicates = sorted(replicate for name, replicate in runs if name == case)
-        design = json.loads(runs[case, replicates[0]].attrs["case"])["design"]
-        usable = [runs[case, replicate] for replicate in replicates if (case, replicate) not in unusable]
-        rows += summarise(case, design, usable, predictor)
-    files.write_table(pd.DataFrame(rows), output)
+    cases, facts = [], []
+    for name, kind in params["cases"]:
+        own = {key: run for key, run in runs.items() if key[0] == name}
+        usable = [run for key, run in own.items() if key not in unusable]
+        design = json.loads(next(iter(own.values())).attrs["case"])["design"]
+        cases.append(Case(name, kind, predict(predictor, design), curves(usable)))
+        times = [float(run["discharge_time"]) for run in usable]
+        facts.append({**design, "discharge_time_s": np.mean(times) if times else np.nan})
+    table = judge(cases, dataset.common_target(runs))
+    files.write_table(table[list(COLUMNS)], verdict)
+    files.write_table(at_a_glance(table, facts, params["cases"], files.read_table(designs)), glance)
 
 
-def summarise(
-    case: str, design: Mapping, runs: list[xr.Dataset], predictor: prediction.Predictor
-) -> list[dict]:
-    """Rows of one case: factors, predicted J (none for the bare hopper), J of its runs raw and corrected.
+def found_design(kind: str, path: str | os.PathLike, factors: Iterable[str]) -> dict[str, float]:
+    """The design, by factor, that a verification case gets from a result of the study.
 
-    With n runs J is that of their mean curve. The noise subtracted is the counting variance for n = 1 and the
-    scatter between the runs otherwise.
+    kind: selected (path: selected.yaml), best_f or best_i (front.csv), plan_best (designs.csv).
     """
-    names = features.OUTPUTS
-    predicted = predictor.objectives(predictor.array(design))[0] if design else [np.nan] * len(names)
-    simulated = _simulated(runs, len(names))
-    discharge_time = np.mean([run["discharge_time"] for run in runs]) if runs else np.nan
-    return [
-        {
-            "case": case,
-            "objective": name,
-            "replicates": len(runs),
-            **{factor: design.get(factor, np.nan) for factor in predictor.factors},
-            "predicted_J": predicted[k],
-            **{column: values[k] for column, values in simulated.items()},
-            "discharge_time_s": discharge_time,
-        }
-        for k, name in enumerate(names)
-    ]
+    if kind == "selected":
+        return files.read_yaml(path)["design"]
+    table = files.read_table(path)
+    by = {"best_f": "J_fine", "best_i": "J_intermediate", PLAN_BEST: "rank"}[kind]
+    return {name: float(table.loc[table[by].idxmin(), name]) for name in factors}
 
 
-def _simulated(runs: list[xr.Dataset], classes: int) -> dict[str, np.ndarray]:
-    """Simulated objectives of the first `classes` size classes, by column."""
-    columns = ("simulated_J_raw", "simulated_J_corrected", "counting_floor")
-    if not runs:
-        return dict.fromkeys(columns, np.full(classes, np.nan))
-    variables = ("exit_time", "diameter", "size_class")
-    curves = [outflow.outflow(*(run[name].values for name in variables)) for run in runs]
-    target = outflow.batch_fractions(runs[0]["diameter"].values, runs[0]["size_class"].values)
-    fraction = np.stack([curve.mass_fraction for curve in curves])
-    counting = np.mean([curve.counting_variance for curve in curves], axis=0) / len(runs)
-    noise = counting if len(runs) == 1 else fraction.var(axis=0, ddof=1) / len(runs)
-    mean = fraction.mean(axis=0)
-    corrected = outflow.signed_root(outflow.corrected_square(mean, target, noise))
-    values = (outflow.objective(mean, target), corrected, outflow.counting_floor(counting))
-    return {column: value[:classes] for column, value in zip(columns, values, strict=True)}
+def predict(predictor: prediction.Predictor, design: Mapping[str, float]) -> Prediction:
+    """What the surrogate says of a design; NaN for the bare hopper.
+
+    Its error of J counts as a standard deviation, so that J squared has the variance 4 J^2 e^2 + 2 e^4; a
+    surrogate that does not know its error has no limits, and no variance.
+    """
+    if not design:
+        return NONE
+    J = predictor.objectives(predictor.array(design))[0]
+    error = np.full_like(J, np.nan) if predictor.objective_error is None else predictor.objective_error
+    variance = np.nan_to_num(4 * J**2 * error**2 + 2 * error**4)
+    return Prediction(J, np.maximum(J - SIGMAS * error, 0), J + SIGMAS * error, Estimate(J**2, variance))
+
+
+def curves(runs: list[xr.Dataset]) -> uncertainty.Runs:
+    """Mean outflow and noise of the runs of one design; NaN without any."""
+    names = ("exit_time", "diameter", "size_class")
+    flows = [outflow.outflow(*(run[name].values for name in names)) for run in runs]
+    if not flows:
+        flows = [outflow.Outflow(*np.full((2, len(SIZE_CLASSES), outflow.GRID.size), np.nan))]
+    return uncertainty.of_runs(*map(np.stack, zip(*flows, strict=True)))
+
+
+def at_a_glance(table: pd.DataFrame, facts: list[dict], cases: list, designs: pd.DataFrame) -> pd.DataFrame:
+    """A row per case and objective, in words: its J fresh, predicted and, for plan_best, in the plan.
+
+    table: as `verdict.judge` makes it; facts: factors and discharge time of each case; designs: designs.csv.
+    """
+    kinds, best = dict(cases), designs.loc[designs["rank"].idxmin()]
+    facts = pd.DataFrame(facts, index=list(kinds))
+    rows = []
+    for _, row in table.iterrows():
+        in_plan = [best[row["objective"] + end] for end in ("", "_low", "_high")]
+        rows.append(
+            {
+                "case": row["case"],
+                **facts.loc[row["case"]],
+                "objective": row["objective"],
+                "n": row["n"],
+                "J_simulated": _in_words(*row[["simulated", "low", "high"]]),
+                "J_predicted": _in_words(*row[["predicted", "predicted_low", "predicted_high"]]),
+                "J_in_plan": _in_words(*in_plan) if kinds[row["case"]] == PLAN_BEST else None,
+                "against_bare": _against_bare(row),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _in_words(value, low, high):
+    """A number with its interval of 90 %, where it has one; None for NaN."""
+    if np.isnan(value):
+        return None
+    return f"{value:.4f}" + ("" if np.isnan(low) else f" ({low:.4f} to {high:.4f})")
+
+
+def _against_bare(row):
+    if row["verdict"] != "not distinguishable":
+        return row["verdict"]
+    return f"not distinguishable: {row['diff_bare']:+.1e} in J squared, {row['detectable']:.1e} would be told"

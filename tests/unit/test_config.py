@@ -128,7 +128,8 @@ def test_unknown_key_is_named_with_its_value_and_the_nearest(key, value, said):
         ("design.lhs.experiments", 10**6, "at most 1000"),
         ("filling.particles", 10**9, "at most 1e+07"),
         ("design.replicates", 401, "at most 400 for 25 designs"),
-        ("verification.replicates", 3334, "at most 3333 for 3 designs"),
+        ("verification.replicates", 1429, "at most 1428 for 7 designs"),
+        ("verification.replicates_of.bare", 1429, "at most 1428 for 7 designs"),
         ("insert.cone.slope_deg", 0.96, "at least 1 and at most 89"),  # radians
         ("particles.density_kg_m3", 2.285, "at least 10"),  # g/cm3
         ("wall.shear_modulus_pa", 22, "at least 1000"),  # MPa
@@ -138,7 +139,7 @@ def test_unknown_key_is_named_with_its_value_and_the_nearest(key, value, said):
         ("insert.cone", 55, "the keys slope_deg, length_mm"),
         ("factors.theta_deg", 55, "the keys key, levels"),
         ("factors", ["theta_deg"], "keys with their values"),
-        ("verification.cases.middle", "centre", "selected, plan_centre, bare, or a number for each factor"),
+        ("verification.cases.middle", "centre", "plan_best, plan_centre, bare, or a number for each factor"),
     ],
 )
 def test_value_that_is_not_allowed(key, value, allowed):
@@ -489,8 +490,8 @@ def test_own_plan_is_checked_like_any_other(tmp_path):
             "50 to 60",
         ),
         (
-            {"verification": {"cases": {"paper": {"theta_deg": 56.7}}}},
-            "verification.cases.paper",
+            {"verification": {"cases": {"other": {"theta_deg": 56.7}}}},
+            "verification.cases.other",
             "a number for",
         ),
         (
@@ -499,6 +500,8 @@ def test_own_plan_is_checked_like_any_other(tmp_path):
             "a number at least 0.001",
         ),
         ({"verification": {"cases": {"exp_01": "bare"}}}, "verification.cases.exp_01", "no experiment"),
+        ({"verification": {"cases": {"plan_best": CENTRE}}}, "verification.cases.plan_best", "is that"),
+        ({"verification": {"replicates_of": {"bear": 3}}}, "verification.replicates_of.bear", "plan_best"),
     ],
 )
 def test_parts_that_do_not_go_together(changes, key, said):
@@ -522,20 +525,38 @@ def test_own_plan_narrower_than_its_levels_is_a_warning(tmp_path):
 
 def test_null_leaves_out_a_factor_and_a_case():
     study = config.parse(
-        with_paper({"factors": {"theta_deg": None}, "verification": {"cases": {"bare": None}}})
+        with_paper({"factors": {"theta_deg": None}, "verification": {"cases": {"bare": None, "paper": None}}})
     )
     assert list(study.levels) == ["length_mm", "height_mm"]
-    assert list(study.cases()) == ["selected", "plan_centre"]
+    assert list(study.cases()) == ["selected", "best_f", "best_i", "plan_best", "plan_centre"]
+
+
+def test_the_papers_design_is_a_default_case_with_its_factors_alone():
+    assert "paper" in config.parse({}).cases()
+    factors = {name: factor.model_dump() for name, factor in config.parse({}).factors.items()}
+    for verification in ({}, {"replicates": 3}):
+        study = config.parse({"factors": factors | {"height_mm": None}, "verification": verification})
+        assert list(study.cases()) == ["selected", "best_f", "best_i", "plan_best", "plan_centre", "bare"]
+    line = only(with_paper({"factors": {"height_mm": None}}))
+    assert line.startswith("verification.cases.paper: ")
+
+
+def test_each_case_has_its_number_of_runs():
+    runs = config.parse({}).verification.replicates_in
+    assert [runs(name) for name in ("selected", "plan_best", "best_f", "bare")] == [20, 20, 10, 10]
+    changes = {"verification": {"replicates": 4, "replicates_of": {"bare": 7}}}
+    runs = config.parse(changes).verification.replicates_in
+    assert [runs(name) for name in ("selected", "bare")] == [4, 7]
 
 
 def test_cases():
     paper = {"theta_deg": 56.7, "length_mm": "32.4", "height_mm": 33}
     study = config.parse(with_paper({"verification": {"cases": {"paper": paper}}}))
     assert study.cases() == {
-        "selected": "derived",
+        **{word: word for word in ("selected", "best_f", "best_i", "plan_best")},
         "plan_centre": CENTRE,
-        "bare": None,
         "paper": {"theta_deg": 56.7, "length_mm": 32.4, "height_mm": 33.0},
+        "bare": None,
     }
 
 
@@ -690,7 +711,9 @@ def test_stage_params_hold_their_own_settings_in_order():
     assert study.stage_params("gather") == {"factors": list(CENTRE), "incomplete": "refuse"}
     assert study.stage_params("optimise")["bounds"]["length_mm"] == [30.0, 50.0]
     assert study.stage_params("optimise")["centre"] == CENTRE
-    assert study.stage_params("verify")["cases"] == ["selected", "plan_centre", "bare"]
+    cases = study.stage_params("verify")["cases"]
+    assert [name for name, _ in cases] == list(study.cases())
+    assert cases[0] == ["selected", "selected"] and cases[-2:] == [["paper", "design"], ["bare", "bare"]]
     assert study.stage_params("train")["hidden_nodes"] == [3, 4, 5, 6, 7, 8, 9, 10]
     for stage in config.STAGES:
         params = study.stage_params(stage)

@@ -35,7 +35,12 @@ def study(tmp_path, make_run):
 def gather(study, **params):
     simulations = sorted(study.glob("exp_*.nc"), reverse=True)
     dataset.gather(
-        PARAMS | params, study / "design.csv", simulations, study / "dataset.nc", study / "runs.csv"
+        PARAMS | params,
+        study / "design.csv",
+        simulations,
+        study / "dataset.nc",
+        study / "runs.csv",
+        study / "designs.csv",
     )
     return files.read_netcdf(study / "dataset.nc")
 
@@ -150,3 +155,36 @@ def test_a_file_that_is_no_run_is_named(study, make_run):
     files.write_netcdf(make_run().drop_vars(["status", "exit_time"]), study / "exp_02_rep_1.nc")
     with pytest.raises(files.InputError, match=r"exp_02_rep_1\.nc: is no run .* exit_time, status"):
         gather(study)
+
+
+def test_designs_are_ranked_by_what_is_left_without_noise(study, make_run):
+    """exp_02 leaves its fine particles first, in exp_01 half of them; exp_100 is well mixed."""
+    for experiment, share in (("exp_01", 0.5), ("exp_02", 1.0)):
+        for replicate in (1, 2):
+            run = make_run(seed=replicate)
+            early = np.arange(200) < share * 200
+            run["exit_time"][:200] = np.where(early, 0.3, 1.0) * run["exit_time"][:200]
+            files.write_netcdf(run, study / f"{experiment}_rep_{replicate}.nc")
+    data = gather(study)
+    table = files.read_table(study / "designs.csv")
+    assert table["experiment"].tolist() == ["exp_100", "exp_01", "exp_02"]
+    assert table["rank"].tolist() == [1, 2, 3]
+    assert table["length_mm"].tolist() == [40, 20, 30] and table["runs"].tolist() == [2, 2, 2]
+    U = data["U_design"].sel(size_class="fine", experiment=table["experiment"].tolist()).values
+    np.testing.assert_allclose(np.sign(table["fine"]) * table["fine"] ** 2, U, rtol=1e-6)
+    assert table["fine"].between(table["fine_low"], table["fine_high"]).all()
+
+
+def test_a_design_without_a_run_has_no_rank_and_a_plan_without_one_is_refused(study, make_run):
+    for replicate in (1, 2):
+        spoil(study, make_run, f"exp_02_rep_{replicate}.nc", status="jammed", stayed=150)
+    data = gather(study, incomplete="drop")
+    assert data["runs"].values.tolist() == [2, 0, 2]
+    assert data["U_design"].sel(experiment="exp_02").isnull().all()
+    table = files.read_table(study / "designs.csv")
+    assert table["experiment"].tolist()[-1] == "exp_02" and np.isnan(table["rank"].iloc[-1])
+    for experiment in ("exp_01", "exp_100"):
+        for replicate in (1, 2):
+            spoil(study, make_run, f"{experiment}_rep_{replicate}.nc", status="jammed", stayed=150)
+    with pytest.raises(files.InputError, match="no experiment has a complete run"):
+        gather(study, incomplete="drop")

@@ -13,7 +13,7 @@ CLONE = Path(__file__).resolve().parents[2]
 SIMULATIONS = ("simulate", "verify_simulate")
 CONFIG = """\
 filling: {particles: 60}
-design: {plan: csv}
+design: {plan: csv, replicates: 1}
 surrogate:
   hidden_nodes: [2, 3]
   selected_hidden_nodes: 2
@@ -22,7 +22,9 @@ surrogate:
   test_experiments: 1
 optimise: {population: 8, generations: 3}
 verification:
-  cases: {selected: selected, plan_centre: plan_centre, bare: bare}
+  replicates: 1
+  replicates_of: {}
+  cases: {selected: selected, best_f: best_f, plan_best: plan_best, plan_centre: plan_centre, bare: bare}
 figures: {dpi: 50}
 """
 # Both extremes of every factor twice: whatever two experiments are held out, or one level is changed.

@@ -20,7 +20,7 @@ from hopperopt import cli, config, document, provenance
 pytestmark = pytest.mark.slow
 
 PAGE = provenance.PACKAGE.parents[1] / "docs" / "reruns.md"
-CASES = ["selected", "plan_centre", "bare"]
+CASES = ["selected", "best_f", "plan_best", "plan_centre", "bare"]
 SIMULATIONS = ("simulate", "verify_simulate")
 EXTRA = "\nEXTRA = 1\n"  # code
 
@@ -70,7 +70,7 @@ def jobs(row):
 def test_cells_hold_nothing_else():
     """A misspelt cell would be a rerun that no other test could see."""
     figure = "|".join(cli.FIGURES)
-    runs = r"all|rep_2|exp_0\d|5|10|(selected|bare|other)( plan_centre)?"
+    runs = r"all|rep_2|exp_0\d|5|10|(selected( best_f)?( plan_best)?|bare|other)( plan_centre)?"
     allowed = {"simulate": runs, "verify_simulate": runs, "figures": rf"all|(({figure})\b ?)+"}
     for first, row in [item for table in TABLES.values() for item in table.items()]:
         for column, cell in row.items():
@@ -193,11 +193,21 @@ def override(study, key, value):
     (study.directory / "other.yaml").write_text(yaml.safe_dump(value))
 
 
+AT_THEIR_OWN = ("insert.", "factors.", "verification.cases.", "verification.replicates_of.")
+
+
 def test_every_key_has_another_value():
     known = {re.sub(r"\.\d+$", "", key) for key in document.dotted_keys(config.parse({}).document)}
-    elsewhere = {key for key in known if key.startswith(("insert.", "factors.", "verification.cases."))}
+    elsewhere = {key for key in known if key.startswith(AT_THEIR_OWN)}
     assert known - elsewhere <= {*OTHER, "design.plan"}
     assert {row["simulate"] for row in map(row_of, OTHER)} == {"all", "rep_2", ""}
+
+
+@pytest.mark.full
+def test_more_runs_of_one_case_are_all_that_runs(study):
+    override(study, "verification.replicates_of.bare", 2)
+    planned = study.planned("--configfile", "other.yaml")
+    assert planned == {"verify_simulate bare_rep_2", "verify", "figure_verdict", "figure_front"}
 
 
 # The code.
@@ -391,7 +401,7 @@ def libraries_changed(study):
 
 # From the last to the first in the study: each file gets a later date than those that are made from it.
 CHAIN = """
-    figures/front.png verification/summary.csv optimum/selected.yaml surrogate/network.nc
+    figures/front.png verification/verdict.csv optimum/selected.yaml surrogate/network.nc
     surrogate/training.nc dataset.nc design.csv simulations/exp_05_rep_1.nc ../plan.csv ../config.yaml
 """
 

@@ -13,10 +13,11 @@ from hopperopt import files
 pytestmark = pytest.mark.slow
 
 OUTPUTS = """
-    design.csv dataset.nc runs.csv surrogate/training.nc surrogate/network.nc surrogate/errors.csv
-    optimum/front.csv optimum/history.nc optimum/selected.yaml verification/summary.csv
-    simulations/exp_01_rep_1.nc verification/selected_rep_1.nc verification/plan_centre_rep_1.nc
-    verification/bare_rep_1.nc logs/simulate/exp_01_rep_1.log logs/simulate/exp_01_rep_1.tsv
+    design.csv dataset.nc runs.csv designs.csv surrogate/training.nc surrogate/network.nc surrogate/errors.csv
+    optimum/front.csv optimum/history.nc optimum/selected.yaml verification/verdict.csv
+    verification/glance.csv simulations/exp_01_rep_1.nc verification/selected_rep_1.nc
+    verification/plan_centre_rep_1.nc verification/bare_rep_1.nc
+    logs/simulate/exp_01_rep_1.log logs/simulate/exp_01_rep_1.tsv
 """
 
 
@@ -24,7 +25,7 @@ def test_every_output_is_there(finished):
     results = finished.directory / "results"
     figures = [
         f"figures/{n}.{f}"
-        for n in ("hopper", "curves", "fit", "verification", "front", "errors")
+        for n in ("hopper", "curves", "fit", "verification", "verdict", "front", "errors")
         for f in ("png", "pdf")
     ]
     assert [name for name in [*OUTPUTS.split(), *figures] if not (results / name).stat().st_size] == []
@@ -48,7 +49,7 @@ def test_every_file_says_by_what_it_was_made(finished):
 def test_each_run_has_a_seed_of_its_own_and_its_code_digest(finished):
     runs = sorted((finished.directory / "results").glob("*/*_rep_*.nc"))
     attributes = [files.read_netcdf(path).attrs for path in runs]
-    assert len({run["seed"] for run in attributes}) == len(runs) == 8
+    assert len({run["seed"] for run in attributes}) == len(runs) == 10
     assert len({run["code_digest"] for run in attributes}) == 1
     assert all(json.loads(run["case"])["seed"] == run["seed"] for run in attributes)
 
@@ -58,13 +59,23 @@ def test_the_selected_design_is_the_one_that_is_verified(finished):
     design = files.read_yaml(results / "optimum" / "selected.yaml")["design"]
     run = files.read_netcdf(results / "verification" / "selected_rep_1.nc")
     assert json.loads(run.attrs["case"])["design"] == pytest.approx(design)
-    summary = files.read_table(results / "verification" / "summary.csv")
-    assert set(zip(summary["case"], summary["objective"], strict=True)) == {
+    verdict = files.read_table(results / "verification" / "verdict.csv")
+    assert list(zip(verdict["case"], verdict["objective"], strict=True)) == [
         (case, objective)
-        for case in ("selected", "plan_centre", "bare")
+        for case in ("selected", "best_f", "plan_best", "plan_centre", "bare")
         for objective in ("fine", "intermediate")
-    }
-    assert summary.loc[summary["case"] == "bare", "predicted_J"].isna().all()
+    ]
+    assert verdict.loc[verdict["case"] == "bare", "predicted"].isna().all()
+
+
+def test_other_found_designs_are_simulated_as_their_tables_have_them(finished):
+    results = finished.directory / "results"
+    front, designs = (files.read_table(results / name) for name in ("optimum/front.csv", "designs.csv"))
+    best = {"best_f": front.loc[front["J_fine"].idxmin()], "plan_best": designs.loc[designs["rank"].idxmin()]}
+    for case, row in best.items():
+        run = files.read_netcdf(results / "verification" / f"{case}_rep_1.nc")
+        design = json.loads(run.attrs["case"])["design"]
+        assert design == pytest.approx({name: row[name] for name in ("theta_deg", "length_mm", "height_mm")})
 
 
 def test_by_hand_and_by_the_workflow_give_the_same_run(finished, tmp_path):
@@ -98,14 +109,16 @@ def test_the_graph_has_every_rule(finished):
         "verify_simulate",
         "verify",
     } <= rules
-    assert len([rule for rule in rules if rule.startswith("figure_")]) == 6
+    assert len([rule for rule in rules if rule.startswith("figure_")]) == 7
 
 
 def test_the_report_holds_tables_and_figures(finished, tmp_path):
     answer = finished.snakemake("--report", tmp_path / "report.html")
     assert answer.returncode == 0, answer.stdout
     text = (tmp_path / "report.html").read_text()
-    assert all(name in text for name in ("summary.csv", "errors.csv", "hopper.png", "front.png"))
+    assert all(
+        name in text for name in ("verdict.csv", "glance.csv", "errors.csv", "hopper.png", "front.png")
+    )
 
 
 @pytest.mark.parametrize(

@@ -84,21 +84,27 @@ def experiment_case(wildcards):
 
 
 def is_derived(case):
-    """Whether a verification case has the design that the study finds."""
-    return CASES[case] == "derived"
+    """Whether a verification case has a design that the study finds."""
+    return isinstance(CASES[case], str)
 
 
 def verification_case(wildcards):
     """Case of a run of the verification; all but the design where that is yet to be found."""
     name, replicate = wildcards.case, int(wildcards.replicate)
     if is_derived(name):
-        return STUDY.derived_params(name, replicate)
+        return {**STUDY.derived_params(name, replicate), "found": CASES[name]}
     return case_of(json.dumps(CASES[name]), name, replicate)
 
 
 def found_design(wildcards):
     """File of the design that a verification run needs; none for the designs that the configuration fixes."""
-    return [result("optimum/selected.yaml")] if is_derived(wildcards.case) else []
+    places = {
+        "selected": "optimum/selected.yaml",
+        "best_f": "optimum/front.csv",
+        "best_i": "optimum/front.csv",
+        "plan_best": "designs.csv",
+    }
+    return [result(places[CASES[wildcards.case]])] if is_derived(wildcards.case) else []
 
 
 def experiment_params(wildcards):
@@ -134,7 +140,7 @@ def plan_runs():
 
 def verification_runs(case):
     """Files of a verification case's runs."""
-    replicates = range(1, STUDY.verification.replicates + 1)
+    replicates = range(1, STUDY.verification.replicates_in(case) + 1)
     return expand(result("verification/{case}_rep_{replicate}.nc"), case=case, replicate=replicates)
 
 

@@ -80,12 +80,33 @@ rule figure_verification:
         "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
 
 
+rule figure_verdict:
+    """Objectives of the cases simulated anew, predicted and simulated, and the verdicts."""
+    input:
+        verdict=result("verification/verdict.csv"),
+        designs=result("designs.csv"),
+    output:
+        png=report(result("figures/verdict.png"), caption="../report/verdict.rst", category="Figures"),
+        pdf=result("figures/verdict.pdf"),
+    log:
+        log_of("figures/verdict"),
+    params:
+        settings=figure("verdict"),
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=5,
+    shell:
+        "python -m hopperopt figure verdict --params {params.settings:q} --verdict {input.verdict:q} "
+        "--designs {input.designs:q} --output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
+
+
 rule figure_front:
     """Pareto front with the selected point, among what was simulated."""
     input:
         front=result("optimum/front.csv"),
         dataset=result("dataset.nc"),
-        summary=result("verification/summary.csv"),
+        verdict=result("verification/verdict.csv"),
     output:
         png=report(result("figures/front.png"), caption="../report/front.rst", category="Figures"),
         pdf=result("figures/front.pdf"),
@@ -99,7 +120,7 @@ rule figure_front:
         runtime=5,
     shell:
         "python -m hopperopt figure front --params {params.settings:q} --front {input.front:q} "
-        "--dataset {input.dataset:q} --summary {input.summary:q} "
+        "--dataset {input.dataset:q} --verdict {input.verdict:q} "
         "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
 
 

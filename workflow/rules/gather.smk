@@ -1,11 +1,14 @@
 rule gather:
-    """One data set of all runs of the plan."""
+    """One data set of all runs of the plan, and its designs by rank."""
     input:
         design=result("design.csv"),
         simulations=plan_runs(),
     output:
         dataset=result("dataset.nc"),
         runs=report(result("runs.csv"), caption="../report/runs.rst", category="Tables"),
+        designs=report(
+            result("designs.csv"), caption="../report/designs.rst", category="Tables"
+        ),
     log:
         log_of("gather"),
     params:
@@ -16,4 +19,4 @@ rule gather:
         runtime=10,
     shell:
         "python -m hopperopt gather --params {params.settings:q} --design {input.design:q} "
-        "--simulations {input.simulations:q} --output {output.dataset:q} {output.runs:q} > {log:q} 2>&1"
+        "--simulations {input.simulations:q} --output {output.dataset:q} {output.runs:q} {output.designs:q} > {log:q} 2>&1"

@@ -20,13 +20,17 @@ rule verify_simulate:
 
 
 rule verify:
-    """Prediction beside simulation."""
+    """What the runs of the verification say of the predictions, and against the bare hopper."""
     input:
         simulations=[verification_runs(case) for case in CASES],
         network=result("surrogate/network.nc"),
+        designs=result("designs.csv"),
     output:
-        summary=report(
-            result("verification/summary.csv"), caption="../report/summary.rst", category="Tables"
+        verdict=report(
+            result("verification/verdict.csv"), caption="../report/verdict_table.rst", category="Tables"
+        ),
+        glance=report(
+            result("verification/glance.csv"), caption="../report/glance.rst", category="Tables"
         ),
     log:
         log_of("verify"),
@@ -38,4 +42,5 @@ rule verify:
         runtime=5,
     shell:
         "python -m hopperopt verify --params {params.settings:q} --simulations {input.simulations:q} "
-        "--network {input.network:q} --output {output.summary:q} > {log:q} 2>&1"
+        "--network {input.network:q} --designs {input.designs:q} "
+        "--output {output.verdict:q} {output.glance:q} > {log:q} 2>&1"

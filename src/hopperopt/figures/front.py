@@ -12,7 +12,6 @@ from hopperopt import files, outflow
 from hopperopt.figures import labels, style
 from hopperopt.surrogate import features
 
-SIGMAS = 1.64  # intervals of 90 %
 COLUMNS = ["J_fine", "J_intermediate"]
 NETWORK = "#009E73"
 FRONT = {"color": NETWORK, "marker": "o", "markersize": 1.8, "linewidth": 0.7}
@@ -28,32 +27,32 @@ def write(
     params: Mapping,
     front: str | os.PathLike,
     dataset: str | os.PathLike,
-    summary: str | os.PathLike,
+    verdict: str | os.PathLike,
     outputs: Sequence[str | os.PathLike],
 ) -> None:
-    """Draw the front; params: `dpi`; front, dataset, summary: paths of front.csv, dataset.nc, summary.csv."""
-    tables = files.read_table(front), files.read_netcdf(dataset), files.read_table(summary)
+    """Draw the front; params: `dpi`; front, dataset, verdict: paths of front.csv, dataset.nc, verdict.csv."""
+    tables = files.read_table(front), files.read_netcdf(dataset), files.read_table(verdict)
     style.save(draw(*tables), outputs, params["dpi"])
 
 
 @style.styled
-def draw(front: pd.DataFrame, dataset: xr.Dataset, summary: pd.DataFrame) -> Figure:
+def draw(front: pd.DataFrame, dataset: xr.Dataset, verdict: pd.DataFrame) -> Figure:
     """Draw J_i over J_f: the front as predicted, and the same among the simulations.
 
     front: columns J_fine, J_intermediate, feasible, selected and the factors; dataset: the plan's
-    experiments; summary: a row per verification case and objective. Simulated objectives are
-    sign(U) sqrt|U|, below zero where a curve departs less from the batch than counting noise does on average.
-    An arrow leads from a case's prediction to its simulation; bars are intervals of 90 % in counting noise.
+    data set; verdict: a row per verification case and objective. Simulated objectives are sign(U) sqrt|U|,
+    below zero where a curve departs less from the batch than noise alone does on average. An arrow leads from
+    a case's prediction to its simulation; bars are intervals of 90 %.
     """
     figure = style.page(style.PAGE, 78)
     near, far = style.panels(figure, 1, 2, style.Frame(15, 3.5, 8.5, 10), (17, 0))[0]
-    for panel, title in ((near, "predicted by the network"), (far, "simulated, counting noise subtracted")):
+    for panel, title in ((near, "predicted by the network"), (far, "simulated, noise subtracted")):
         panel.set(xlabel=style.OBJECTIVES["fine"], ylabel=style.OBJECTIVES["intermediate"])
         panel.set_title(title, loc="left")
         panel.locator_params(nbins=6)
         _draw_front(panel, front)
     _label_selected(near, front)
-    _draw_simulated(far, front, plan_objectives(dataset), summary)
+    _draw_simulated(far, front, _plan_objectives(dataset), verdict)
     style.key(figure, _meanings(front), (2, 77))
     return figure
 
@@ -84,7 +83,7 @@ def _label_selected(panel, front):
         labels.at_points(panel, {text: tuple(row[COLUMNS])}, _along(front[COLUMNS].to_numpy(float)))
 
 
-def _draw_simulated(panel, front, plan, summary):
+def _draw_simulated(panel, front, plan, verdict):
     """Draw the plan's experiments and the verification cases, with labels."""
     for line in (panel.axhline, panel.axvline):
         line(0, color=style.FAINT, linewidth=0.5, zorder=0)
@@ -93,9 +92,9 @@ def _draw_simulated(panel, front, plan, summary):
     places, lines = {}, [np.repeat(plan.T, 4, axis=0), _along(front[COLUMNS].to_numpy(float))]
     panel.autoscale_view()
     lines += [_along([(x, 0) for x in panel.get_xlim()]), _along([(0, y) for y in panel.get_ylim()])]
-    for case in dict.fromkeys(summary["case"]):
-        rows = summary[summary["case"] == case].set_index("objective").loc[list(features.OUTPUTS)]
-        simulated = rows["simulated_J_corrected"].to_numpy()
+    for case in dict.fromkeys(verdict["case"]):
+        rows = verdict[verdict["case"] == case].set_index("objective").loc[list(features.OUTPUTS)]
+        simulated = rows["simulated"].to_numpy(float)
         if np.isfinite(simulated).all():
             places[case.replace("_", " ")] = tuple(simulated)
             lines += _draw_case(panel, rows)
@@ -104,14 +103,13 @@ def _draw_simulated(panel, front, plan, summary):
 
 def _draw_case(panel, rows):
     """Draw prediction and simulation of a case; return points (n, 2) along each line drawn."""
-    simulated = rows["simulated_J_corrected"].to_numpy()
-    (left, bottom), (right, top) = interval(simulated, rows["counting_floor"].to_numpy())
+    columns = ["simulated", "low", "high", "predicted"]
+    simulated, (left, bottom), (right, top), predicted = rows[columns].to_numpy(float).T
     x, y = simulated
     panel.plot(x, y, zorder=3, **SIMULATED)
     lines = [[(left, y), (right, y)], [(x, bottom), (x, top)]]
     for line in lines:
         panel.plot(*np.transpose(line), color=SIMULATED["color"], linewidth=0.5, zorder=2)
-    predicted = rows["predicted_J"].to_numpy()
     if np.isfinite(predicted).all():
         panel.plot(*predicted, zorder=2, **PREDICTED)
         panel.annotate("", simulated, predicted, zorder=2, arrowprops=ARROW)
@@ -126,32 +124,7 @@ def _along(line):
     return np.column_stack([np.interp(at, np.arange(len(line)), values) for values in line.T])
 
 
-def interval(corrected: np.ndarray, floor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Limits, as signed roots, of an interval that holds nine of ten corrected squares in counting noise.
-
-    corrected: sign(U) sqrt|U|; floor: counting noise sqrt(mean s^2) of what U comes from. The variance of U
-    is [4 sum d^2 s^2 + 2 sum s^4] / n^2 over the n windows, d^2 being the squares without noise; here every
-    window has the mean s^2 and d^2.
-    """
-    square = np.sign(corrected) * corrected**2
-    variance = (4 * np.maximum(square, 0) * floor**2 + 2 * floor**4) / outflow.GRID.size
-    return tuple(outflow.signed_root(square + sign * SIGMAS * np.sqrt(variance)) for sign in (-1, 1))
-
-
-def plan_objectives(dataset: xr.Dataset) -> np.ndarray:
-    """Corrected objectives sign(U) sqrt|U| of the plan's experiments, (output, experiment).
-
-    The noise taken off is the counting variance where one run is complete, and the scatter between the runs
-    otherwise.
-    """
-    data = dataset.sel(size_class=list(features.OUTPUTS))
-    runs = data["mass_fraction"].notnull().all(("size_class", "M")).sum("replicate")
-    scatter = data["mass_fraction"].var("replicate", ddof=1) / runs
-    noise = xr.where(runs > 1, scatter, data["counting_variance"].mean("replicate"))
-    order = ("size_class", "experiment", "M")
-    square = outflow.corrected_square(
-        data["mass_fraction"].mean("replicate").transpose(*order).values,
-        data["target_fraction"].values[:, None],
-        noise.transpose(*order).values,
-    )
-    return outflow.signed_root(square)
+def _plan_objectives(dataset):
+    """Objectives sign(U) sqrt|U| of the plan's designs, (output, experiment)."""
+    U = dataset["U_design"].sel(size_class=list(features.OUTPUTS)).transpose("size_class", "experiment")
+    return outflow.signed_root(U.values)

@@ -10,7 +10,7 @@ from matplotlib.text import Text
 from hopperopt.figures import style
 
 # Where a label may stand beside its point: distances in points, directions, the likelier ones first.
-DISTANCES = (5.0, 10.0, 16.0, 24.0)
+DISTANCES = (5.0, 10.0, 16.0, 24.0, 34.0, 46.0)
 DIRECTIONS = ((1, 0), (-1, 0), (0, 1), (0, -1), (0.7, 0.7), (0.7, -0.7), (-0.7, 0.7), (-0.7, -0.7))
 ALIGN, ALIGN_UP = {1: "left", 0: "center", -1: "right"}, {1: "bottom", 0: "center", -1: "top"}
 
@@ -54,7 +54,7 @@ def at_points(axes: Axes, labels: Mapping[str, tuple[float, float]], others: np.
         taken, costs = [_moved(other) for other in texts], []
         for distance, direction in itertools.product(DISTANCES, DIRECTIONS):
             box = _moved(label, distance, direction)
-            covered = box.padded(2).count_contains(points) + 3 * box.count_overlaps(taken)
+            covered = box.padded(2).count_contains(points) + 50 * box.padded(1).count_overlaps(taken)
             misleading = np.argmin(_distances(box, own)) != index
             outside = not (frame.contains(*box.min) and frame.contains(*box.max))
             cost = covered + 10 * misleading + 100 * outside + 0.15 * distance

@@ -6,10 +6,12 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
+from hopperopt.dataset import replicates
 from hopperopt.files import InputError, read_netcdf, write_netcdf
-from hopperopt.outflow import corrected_square, objective
+from hopperopt.outflow import objective
 from hopperopt.surrogate.features import OUTPUTS
 from hopperopt.surrogate.split import TRAINING, split_experiments, split_points
+from hopperopt.uncertainty import estimate, pooled_variance
 
 
 def filter_targets(params: Mapping, dataset: str | os.PathLike, output: str | os.PathLike) -> None:
@@ -51,7 +53,7 @@ def filter_targets(params: Mapping, dataset: str | os.PathLike, output: str | os
         "left_out": " ".join(left_out),
     }
     result = _with_objectives(result, within)
-    result["U"] = _corrected_squares(data, result)
+    result["U"] = _corrected_squares(data)
     write_netcdf(result, output)
 
 
@@ -137,14 +139,12 @@ def _with_objectives(result, within):
     return result
 
 
-def _corrected_squares(data, result):
-    """U of each experiment's mean curve; the mean of n runs has the mean of their variances over n."""
-    runs = data["mass_fraction"].notnull().all(("size_class", "M")).sum("replicate")
-    variance = data["counting_variance"].mean("replicate") / runs
-    variance = variance.sel(size_class=list(OUTPUTS)).transpose("experiment", "size_class", "M")
-    values = corrected_square(result["target"].values, result["target_fraction"].values, variance.values)
-    text = "objective squared of the mean curve, less its counting variance; may be negative"
-    return ("experiment", "output"), values, _described(text)
+def _corrected_squares(data):
+    """U of each experiment's mean curve, (experiment, output)."""
+    runs = replicates(data)
+    U = estimate(runs, data["target_fraction"].values, pooled_variance(runs)).square[:, : len(OUTPUTS)]
+    text = "objective squared of the mean curve, less its noise; may be negative"
+    return ("experiment", "output"), U, _described(text)
 
 
 def _described(text):
