@@ -16,7 +16,6 @@ from pymoo.operators.mutation.pm import PM
 from pymoo.optimize import minimize
 
 from hopperopt.files import write_netcdf, write_table, write_yaml
-from hopperopt.outflow import objective
 from hopperopt.select import select
 from hopperopt.surrogate import prediction
 from hopperopt.surrogate.features import OUTPUTS, factor_grid, violation
@@ -120,7 +119,7 @@ class _Segregation(Problem):
 
     def _evaluate(self, designs, out, *args, **kwargs):
         curves = self.predictor.curves(designs)
-        out["F"] = objective(curves, self.predictor.batch)
+        out["F"] = self.predictor.objectives(designs)
         out["G"] = violation(curves)[:, None]
 
 

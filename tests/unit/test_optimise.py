@@ -8,7 +8,7 @@ from pymoo.indicators.igd_plus import IGDPlus
 from hopperopt import files, optimise
 from hopperopt.surrogate import prediction
 from hopperopt.surrogate.features import factor_grid, violation
-from hopperopt.surrogate.network import Network, Scaling
+from hopperopt.surrogate.network import Ensemble, Network, Scaling
 
 BATCH = np.array([8, 27]) / 99
 RANGES = {"theta_deg": [50, 60], "length_mm": [30, 50], "height_mm": [26, 34]}
@@ -34,7 +34,7 @@ def predictor(batch=BATCH):
     output = np.column_stack([output, -output.sum(axis=1) / 2])
     inputs = Scaling(np.append(BOUNDS.mean(axis=1), 0.5), np.append(np.ptp(BOUNDS, axis=1) / 2, 0.5))
     network = Network(hidden, output, inputs, Scaling(batch, np.array([0.03, 0.05])))
-    return prediction.Predictor(tuple(RANGES), np.linspace(0, 1, 21), batch, network)
+    return prediction.Predictor(tuple(RANGES), np.linspace(0, 1, 21), batch, Ensemble((network,)))
 
 
 def grid_objectives(model, points=61):
@@ -189,21 +189,21 @@ def test_nothing_possible_gives_the_least_impossible_and_says_so(run, caplog):
 
 def test_any_number_of_factors(run):
     """Four factors, the last without influence; and one alone."""
-    four, one = predictor(), predictor()
-    hidden = np.insert(four.network.hidden, 3, 0, axis=1)
-    scaling = Scaling(*(np.insert(part, 3, 1) for part in four.network.inputs_scaling))
-    four = four._replace(
-        factors=(*RANGES, "outlet_mm"), network=four.network._replace(hidden=hidden, inputs_scaling=scaling)
-    )
+    four, one = (model.model.members[0] for model in (predictor(), predictor()))
+
+    def with_factors(names, network, hidden, change):
+        scaling = Scaling(*(change(part) for part in network.inputs_scaling))
+        network = network._replace(hidden=hidden, inputs_scaling=scaling)
+        return predictor()._replace(factors=names, model=Ensemble((network,)))
+
+    hidden = np.insert(four.hidden, 3, 0, axis=1)
+    four = with_factors((*RANGES, "outlet_mm"), four, hidden, lambda part: np.insert(part, 3, 1))
     table, history, selected = run(
         model=four, bounds=RANGES | {"outlet_mm": [20, 25]}, centre=PARAMS["centre"] | {"outlet_mm": 22.5}
     )
     assert history.sizes["factor"] == 4 and "outlet_mm" in table
     assert set(selected["design"]) == {*RANGES, "outlet_mm"}
-    hidden = np.delete(one.network.hidden, [1, 2], axis=1)
-    scaling = Scaling(*(np.delete(part, [1, 2]) for part in one.network.inputs_scaling))
-    one = one._replace(
-        factors=("theta_deg",), network=one.network._replace(hidden=hidden, inputs_scaling=scaling)
-    )
+    hidden = np.delete(one.hidden, [1, 2], axis=1)
+    one = with_factors(("theta_deg",), one, hidden, lambda part: np.delete(part, [1, 2]))
     table, _, _ = run(model=one, bounds={"theta_deg": [50, 60]}, centre={"theta_deg": 55})
     assert list(table)[:3] == ["theta_deg", "J_fine", "J_intermediate"]

@@ -150,6 +150,17 @@ def test_too_few_experiments_left_are_refused(filtered, by):
         filtered(data, split=by)
 
 
+def test_variance_of_a_mean_curve_is_its_runs_scatter_or_the_counting_variance_of_one(filtered):
+    data = dataset(replicates=3)
+    data["mass_fraction"][::2, 1:] = np.nan
+    data["counting_variance"][::2, 1:] = np.nan
+    result = filtered(data)
+    assert result["runs"].values.tolist() == [1, 3] * 12 + [1]
+    np.testing.assert_allclose(result["variance"][::2].mean(("experiment", "M")), NOISE[:2] ** 2)
+    several = data["mass_fraction"][1::2].values[:, :, :2]
+    np.testing.assert_allclose(result["variance"][1::2], several.var(axis=1, ddof=1) / 3)
+
+
 def test_corrected_square_has_lost_the_noise_of_the_mean(filtered):
     """U scatters around J^2 of the curves without noise, whatever the number of runs."""
     data = dataset(replicates=3)
@@ -218,7 +229,7 @@ def test_network_file_gives_back_the_predictor_and_its_origin(trained):
     path, errors = trained(dataset())
     predictor, stored = prediction.load(path), files.read_netcdf(path)
     assert predictor.factors == tuple(FACTORS)
-    assert stored["hidden_weights"].sizes == {"hidden": 4, "input": 3}
+    assert stored["hidden_weights"].sizes == {"member": 1, "hidden": 4, "input": 3}
     assert stored.attrs["start"] == errors.loc[4, "start"]
     assert (stored.attrs["seed"], stored.attrs["split_by"]) == (5, "experiments")
     assert "numpy" in json.loads(stored.attrs["versions"])
@@ -320,7 +331,7 @@ def test_cross_validation_judges_whole_groups_once_and_never_trains_on_them(trai
 
     monkeypatch.setattr(training, "NetworkRegressor", Spy)
     trained(dataset(), {"split": by}, hidden_nodes=[2], starts=1, selected_hidden_nodes="auto")
-    folds = seen[1:6]
+    folds = seen[:5]
     judged = [row for fold in folds for row in fold[2]]
     assert len(judged) == len(set(judged)) == 21 * 21
     for fold in folds:

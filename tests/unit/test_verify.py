@@ -8,7 +8,7 @@ import pytest
 
 from hopperopt import files, outflow, verify
 from hopperopt.surrogate import prediction
-from hopperopt.surrogate.network import Network, Scaling
+from hopperopt.surrogate.network import Ensemble, Network, Scaling
 from hopperopt.verdict import COLUMNS
 
 CENTRE = {"theta_deg": 55.0, "length_mm": 40.0}
@@ -37,7 +37,7 @@ def study(tmp_path, make_run):
         np.zeros((1, 4)), np.zeros((2, 2)), Scaling(np.zeros(3), np.ones(3)), Scaling(batch, np.ones(2))
     )
     network.output[:, 1] = [0.01, 0.02]
-    predictor = prediction.Predictor(tuple(CENTRE), outflow.GRID, batch, network)
+    predictor = prediction.Predictor(tuple(CENTRE), outflow.GRID, batch, Ensemble((network,)))
     prediction.save(tmp_path / "network.nc", predictor, {}, {})
     files.write_table(DESIGNS, tmp_path / "designs.csv")
     for seed, (case, design) in enumerate({"selected": CENTRE, "plan_best": CENTRE, "bare": {}}.items()):

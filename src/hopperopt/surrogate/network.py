@@ -14,6 +14,8 @@ from threadpoolctl import threadpool_limits
 # Decorates what multiplies matrices: the bits of large products depend on the number of BLAS' threads.
 one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
 
+from hopperopt.surrogate import features
+
 CHUNK = 50_000  # rows predicted at a time, to bound the memory
 
 
@@ -56,6 +58,25 @@ class Network(NamedTuple):
             for first in range(0, len(inputs), CHUNK)
         ]
         return self.outputs_scaling.restore(np.concatenate(parts))
+
+
+class Ensemble(NamedTuple):
+    """Networks that each say what a curve may be; one alone is sure of itself."""
+
+    members: tuple[Network, ...]
+
+    def moments(self, designs: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and variance of the members' curves at designs (n, factors), (n, outputs, m) each."""
+        curves = self._curves(designs, M)
+        return curves.mean(axis=0), curves.var(axis=0)
+
+    def draws(self, designs: np.ndarray, M: np.ndarray, number: int, rng: np.random.Generator) -> np.ndarray:
+        """Curves of members drawn at random, (number, n, outputs, m): one member for all designs."""
+        return self._curves(designs, M)[rng.integers(len(self.members), size=number)]
+
+    def _curves(self, designs, M):
+        rows = features.rows(designs, M)
+        return np.stack([features.curves(member.predict(rows), len(M)) for member in self.members])
 
 
 def range_scaling(values: np.ndarray) -> Scaling:

@@ -54,6 +54,7 @@ def filter_targets(params: Mapping, dataset: str | os.PathLike, output: str | os
     }
     result = _with_objectives(result, within)
     result["U"] = _corrected_squares(data)
+    result = result.assign(_noise(data))
     write_netcdf(result, output)
 
 
@@ -145,6 +146,19 @@ def _corrected_squares(data):
     U = estimate(runs, data["target_fraction"].values, pooled_variance(runs)).square[:, : len(OUTPUTS)]
     text = "objective squared of the mean curve, less its noise; may be negative"
     return ("experiment", "output"), U, _described(text)
+
+
+def _noise(data):
+    """Number of runs of each experiment, and the variance of their mean curve.
+
+    Each experiment's own: the scatter between its runs, the counting variance where there is one alone.
+    """
+    runs, dimensions = replicates(data), ("experiment", "output", "M")
+    variance = (runs.variance / runs.number)[:, : len(OUTPUTS)]
+    return {
+        "runs": ("experiment", runs.number[:, 0, 0], _described("number of runs that are data points")),
+        "variance": (dimensions, variance, _described("variance of the target by its runs' noise")),
+    }
 
 
 def _described(text):

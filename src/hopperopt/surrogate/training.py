@@ -14,6 +14,7 @@ from hopperopt.files import InputError, read_netcdf, write_table
 from hopperopt.outflow import signed_root
 from hopperopt.surrogate import features, prediction
 from hopperopt.surrogate.estimator import NetworkRegressor
+from hopperopt.surrogate.network import Ensemble
 from hopperopt.surrogate.split import TEST, TRAINING, VALIDATION, folds
 from hopperopt.surrogate.targets import clip_limits
 
@@ -44,22 +45,15 @@ def train(
     """
     data = read_netcdf(training)
     points = read_points(data)
-    sizes, choice = params["hidden_nodes"], params["selected_hidden_nodes"]
-    if choice != "auto" and choice not in sizes:
-        raise InputError(f"selected_hidden_nodes: {choice} is not allowed; allowed: auto, {sizes}")
     trained, stopping = points.use == TRAINING, points.use == VALIDATION
     validation = points.inputs[stopping], points.targets[stopping]
+    choice, scores = choose_size(points, params, data.attrs["clip_sigma"])
     regressors = {
         size: NetworkRegressor(size, params["starts"], params["seed"]).fit(
             points.inputs[trained], points.clipped[trained], validation
         )
-        for size in sizes
+        for size in params["hidden_nodes"]
     }
-    scores = {}
-    if choice == "auto":
-        scores = cross_validate(points, params, data.attrs["clip_sigma"])
-        # Ties go to the smaller network.
-        choice = min(sorted(sizes), key=lambda size: np.mean(scores[size] ** 2 / _variances(points)))
     write_table(_error_table(points, regressors, scores, choice), errors)
     _save(network, data, regressors[choice], params)
 
@@ -81,6 +75,21 @@ def read_points(data: xr.Dataset) -> Points:
         np.repeat(use, moments) if whole else use.ravel(),
         np.repeat(np.arange(count), moments) if whole else np.arange(count * moments),
     )
+
+
+def choose_size(points: Points, params: Mapping, clip_sigma: float) -> tuple[int, dict[int, np.ndarray]]:
+    """The number of hidden nodes, given or the best in the cross-validation, and the errors of the latter.
+
+    params as in `train`; raises files.InputError for a given number that is none of `hidden_nodes`.
+    """
+    sizes, choice = params["hidden_nodes"], params["selected_hidden_nodes"]
+    if choice == "auto":
+        scores = cross_validate(points, params, clip_sigma)
+        # Ties go to the smaller network.
+        return min(sorted(sizes), key=lambda size: np.mean(scores[size] ** 2 / _variances(points))), scores
+    if choice not in sizes:
+        raise InputError(f"selected_hidden_nodes: {choice} is not allowed; allowed: auto, {sizes}")
+    return choice, {}
 
 
 def cross_validate(points: Points, params: Mapping, clip_sigma: float) -> dict[int, np.ndarray]:
@@ -151,7 +160,7 @@ def _save(path, data, regressor, params):
         tuple(data.attrs["factors"].split()),
         data["M"].values,
         data["target_fraction"].values,
-        regressor.network_,
+        Ensemble((regressor.network_,)),
     )
     predictor = predictor._replace(objective_error=_objective_error(data, predictor))
     additions = {name: data[name] for name in ("clip_low", "clip_high", "split")}

@@ -1,0 +1,117 @@
+"""Gaussian processes and ensembles on curves of a known shape, with noise of a known size."""
+
+import numpy as np
+import pytest
+
+from hopperopt import files
+from hopperopt.outflow import GRID, objective
+from hopperopt.surrogate import ensemble, gaussian, prediction
+
+NETWORKS = {"hidden_nodes": [3], "starts": 3, "selected_hidden_nodes": 3, "seed": 1}
+
+
+def predictor(synthetic, model):
+    return prediction.Predictor(tuple(synthetic.factors), GRID, synthetic.batch, model)
+
+
+@pytest.mark.parametrize("runs", [1, 3])
+def test_intervals_of_the_processes_cover_nine_of_ten(synthetic, runs):
+    """Mean curves of fresh runs, and the curves without noise; six plans, thirty new designs each."""
+    seen, true = [], []
+    rng = np.random.default_rng(runs)
+    for seed in range(6):
+        model = gaussian.fit(synthetic.training(runs, seed=seed))
+        designs = synthetic.anywhere(30, rng)
+        truth, variance = synthetic.curves(designs), synthetic.noise[:, None] ** 2 / runs
+        fresh = truth + np.sqrt(variance) * rng.normal(size=truth.shape)
+        mean, error = model.moments(designs, GRID)
+        true.append(np.abs(truth - mean) < 1.645 * np.sqrt(error))
+        seen.append(np.abs(fresh - mean) < 1.645 * np.sqrt(error + variance))
+    assert np.mean(seen) == pytest.approx(0.9, abs=0.03)
+    assert np.mean(true) == pytest.approx(0.92, abs=0.04)
+
+
+def test_the_processes_find_the_curves_behind_the_noise(synthetic):
+    data, designs = synthetic.training(3), synthetic.anywhere(50, np.random.default_rng(0))
+    truth, model = synthetic.curves(designs), predictor(synthetic, gaussian.fit(data))
+    error = np.sqrt(np.mean((model.curves(designs) - truth) ** 2, axis=(0, 2)))
+    assert (error < synthetic.noise / np.sqrt(3)).all()
+    J = objective(truth, synthetic.batch)
+    assert (np.sqrt(np.mean((model.objectives(designs) - J) ** 2, axis=0)) < 0.6 * J.std(axis=0)).all()
+
+
+def test_without_an_effect_the_processes_predict_one_curve(synthetic):
+    designs, bias = synthetic.anywhere(50, np.random.default_rng(0)), []
+    J = objective(synthetic.curves(synthetic.designs).mean(axis=0), synthetic.batch)
+    for seed in range(6):
+        model = predictor(synthetic, gaussian.fit(synthetic.training(3, seed, effect=0)))
+        spread = model.curves(designs).std(axis=0).mean(axis=-1)
+        assert (spread < 0.25 * synthetic.noise / np.sqrt(3)).all()
+        bias.append((model.objectives(designs) ** 2).mean(axis=0) - J**2)
+    # Nor does noise add to J: less than a tenth of what it adds to that of one design's mean curve.
+    assert (np.abs(np.mean(bias, axis=0)) < 0.1 * synthetic.noise**2 / 3).all()
+
+
+def fitted(synthetic):
+    data = synthetic.training(3)
+    return {
+        "gaussian": gaussian.fit(data),
+        "ensemble": ensemble.fit(data, NETWORKS, np.inf),
+    }
+
+
+def test_draws_have_the_moments_and_are_joint_over_the_designs(synthetic):
+    designs = synthetic.anywhere(3, np.random.default_rng(0))
+    designs = np.vstack([designs, designs[0] + 1e-6])
+    for model in fitted(synthetic).values():
+        draws = model.draws(designs, GRID, 8000, np.random.default_rng(1))
+        mean, variance = model.moments(designs, GRID)
+        np.testing.assert_allclose(draws.mean(axis=0), mean, atol=5 * np.sqrt(variance.max() / 8000))
+        np.testing.assert_allclose(draws.var(axis=0), variance, rtol=0.1, atol=1e-9)
+        J = objective(draws, synthetic.batch)
+        squares = np.sqrt(np.mean(J**2, axis=0))
+        np.testing.assert_allclose(predictor(synthetic, model).objectives(designs), squares, rtol=0.02)
+        twin, other = (np.var(J[:, 0] - J[:, k], axis=0) for k in (3, 1))
+        assert (twin < 0.5 * other).all()
+
+
+def test_a_file_gives_back_the_surrogate(synthetic, tmp_path):
+    designs = synthetic.anywhere(4, np.random.default_rng(0))
+    for name, model in fitted(synthetic).items():
+        one = predictor(synthetic, model)._replace(objective_error=np.array([0.001, 0.002]))
+        prediction.save(tmp_path / f"{name}.nc", one, {}, {"title": name})
+        read = prediction.load(tmp_path / f"{name}.nc")
+        assert read.factors == one.factors and read.objective_error.tolist() == [0.001, 0.002]
+        for draws in (2, 3):
+            first, second = (each.draws(designs, draws, np.random.default_rng(draws)) for each in (one, read))
+            np.testing.assert_array_equal(first, second)
+        np.testing.assert_array_equal(read.objectives(designs), one.objectives(designs))
+        assert files.read_netcdf(tmp_path / f"{name}.nc").attrs["title"] == name
+
+
+def test_each_fold_stops_one_member_and_trains_the_others(synthetic, monkeypatch):
+    seen = []
+
+    class Spy(ensemble.NetworkRegressor):
+        def fit(self, X, y, validation=None, groups=None):
+            seen.append([{tuple(row[:-1]) for row in rows} for rows in (X, validation[0])])
+            return super().fit(X, y, validation)
+
+    monkeypatch.setattr(ensemble, "NetworkRegressor", Spy)
+    model = ensemble.fit(synthetic.training(1), NETWORKS, np.inf)
+    assert len(model.members) == len(seen) == 5
+    for training, stopping in seen:
+        assert not training & stopping and len(training) + len(stopping) == 25
+    assert set.union(*(stopping for _, stopping in seen)) == {tuple(row) for row in synthetic.designs}
+
+
+def test_members_see_clipped_targets_and_stop_on_simulated_ones(synthetic):
+    """The spike at the end is cut off by a clip, and stands in the curves without one."""
+    data = synthetic.training(3)
+    whole, clipped = (
+        ensemble.fit(data, NETWORKS | {"hidden_nodes": [6], "selected_hidden_nodes": 6}, sigma)
+        .moments(synthetic.designs, GRID)[0][:, 0, -1]
+        .max()
+        for sigma in (np.inf, 1.5)
+    )
+    assert clipped < 0.8 * whole
