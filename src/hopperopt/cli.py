@@ -54,6 +54,16 @@ STAGES = {
     "train": Stage(
         "surrogate.training", "train", ("training",), ("network.nc", "errors.csv"), "train the networks"
     ),
+    "validate_fold": Stage(
+        "surrogate.folds", "fold", ("training",), ("EXPERIMENT.nc",), "predict one experiment from the others"
+    ),
+    "validate": Stage(
+        "surrogate.validation",
+        "validate",
+        ("training", "folds*"),
+        ("validation.csv", "validation.nc"),
+        "compare the surrogates",
+    ),
     "optimise": Stage(
         "optimise",
         "optimise",

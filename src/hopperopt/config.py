@@ -344,6 +344,12 @@ class Design(Model):
     csv: OwnPlan = OwnPlan()
 
 
+class Validation(Model):
+    """The comparison of the surrogates, each experiment left out once."""
+
+    starts: Count = 20
+
+
 class Surrogate(Model):
     """The network: filter, split, hidden sizes and starts."""
 
@@ -354,7 +360,14 @@ class Surrogate(Model):
     split: Literal["experiments", "points"] = "experiments"
     validation_experiments: Count = 4
     test_experiments: Count = 4
+    validation: Validation = Validation()
     seed: Seed = 1
+
+    @property
+    def validated(self):
+        """Settings of the networks that are compared, as plain values."""
+        networks = {"hidden_nodes", "selected_hidden_nodes", "seed"}
+        return {**self.model_dump(mode="json", include=networks), "starts": self.validation.starts}
 
 
 class Optimise(Model):
@@ -536,6 +549,8 @@ STAGES = {
     "train": lambda study: study.surrogate.model_dump(
         mode="json", include={"hidden_nodes", "starts", "selected_hidden_nodes", "seed"}
     ),
+    "validate_fold": lambda study: study.surrogate.validated,
+    "validate": lambda study: study.surrogate.validated,
     "optimise": lambda study: {
         **study.optimise.model_dump(exclude={"explicit"}),
         "explicit": study.optimise.explicit if study.optimise.select == "explicit" else None,

@@ -95,6 +95,7 @@ class Synthetic:
                 "runs": ("experiment", np.full(len(truth), runs)),
                 "U": (("experiment", "output"), outflow.corrected_square(mean, self.batch, variance)),
                 "target_clipped": (("experiment", "output", "M"), mean),
+                "split": ("experiment", ["training"] * 17 + ["validation"] * 4 + ["test"] * 4),
                 "target_fraction": ("output", self.batch),
             },
             coords={

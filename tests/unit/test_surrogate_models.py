@@ -7,7 +7,7 @@ from hopperopt import files
 from hopperopt.outflow import GRID, objective
 from hopperopt.surrogate import ensemble, gaussian, prediction
 
-NETWORKS = {"hidden_nodes": [3], "starts": 3, "selected_hidden_nodes": 3, "seed": 1}
+NETWORKS = {"hidden_nodes": 3, "starts": 3, "seed": 1}
 
 
 def predictor(synthetic, model):
@@ -56,7 +56,7 @@ def fitted(synthetic):
     data = synthetic.training(3)
     return {
         "gaussian": gaussian.fit(data),
-        "ensemble": ensemble.fit(data, NETWORKS, np.inf),
+        "ensemble": ensemble.fit(data, clip_sigma=np.inf, **NETWORKS),
     }
 
 
@@ -98,7 +98,7 @@ def test_each_fold_stops_one_member_and_trains_the_others(synthetic, monkeypatch
             return super().fit(X, y, validation)
 
     monkeypatch.setattr(ensemble, "NetworkRegressor", Spy)
-    model = ensemble.fit(synthetic.training(1), NETWORKS, np.inf)
+    model = ensemble.fit(synthetic.training(1), clip_sigma=np.inf, **NETWORKS)
     assert len(model.members) == len(seen) == 5
     for training, stopping in seen:
         assert not training & stopping and len(training) + len(stopping) == 25
@@ -109,7 +109,7 @@ def test_members_see_clipped_targets_and_stop_on_simulated_ones(synthetic):
     """The spike at the end is cut off by a clip, and stands in the curves without one."""
     data = synthetic.training(3)
     whole, clipped = (
-        ensemble.fit(data, NETWORKS | {"hidden_nodes": [6], "selected_hidden_nodes": 6}, sigma)
+        ensemble.fit(data, clip_sigma=sigma, **NETWORKS | {"hidden_nodes": 5})
         .moments(synthetic.designs, GRID)[0][:, 0, -1]
         .max()
         for sigma in (np.inf, 1.5)

@@ -18,6 +18,7 @@ surrogate:
   hidden_nodes: [2, 3]
   selected_hidden_nodes: 2
   starts: 2
+  validation: {starts: 1}
   validation_experiments: 1
   test_experiments: 1
 optimise: {population: 8, generations: 3}

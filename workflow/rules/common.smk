@@ -67,6 +67,12 @@ def stage(name):
     return as_json(STUDY.stage_params(name), cli.STAGES[name].module)
 
 
+def fold_params(wildcards):
+    """Parameters of the surrogates' validation without one experiment."""
+    settings = STUDY.stage_params("validate_fold") | {"experiment": wildcards.experiment}
+    return as_json(settings, cli.STAGES["validate_fold"].module)
+
+
 def figure(name):
     """Parameters of a figure."""
     return as_json(STUDY.stage_params("figures"), f"figures.{name}")

@@ -37,3 +37,45 @@ rule train:
     shell:
         "python -m hopperopt train --params {params.settings:q} --training {input.training:q} "
         "--output {output.network:q} {output.errors:q} > {log:q} 2>&1"
+
+
+rule validate_fold:
+    """One experiment predicted by every surrogate from all others."""
+    input:
+        training=result("surrogate/training.nc"),
+    output:
+        fold=result("surrogate/validation/{experiment}.nc"),
+    log:
+        log_of("validate_fold/{experiment}"),
+    params:
+        settings=fold_params,
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    shell:
+        "python -m hopperopt validate_fold --params {params.settings:q} --training {input.training:q} "
+        "--output {output.fold:q} > {log:q} 2>&1"
+
+
+rule validate:
+    """All surrogates compared at experiments that they have not seen."""
+    input:
+        training=result("surrogate/training.nc"),
+        folds=expand(result("surrogate/validation/{experiment}.nc"), experiment=EXPERIMENTS),
+    output:
+        table=report(
+            result("surrogate/validation.csv"), caption="../report/validation.rst", category="Tables"
+        ),
+        predictions=result("surrogate/validation.nc"),
+    log:
+        log_of("validate"),
+    params:
+        settings=stage("validate"),
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    shell:
+        "python -m hopperopt validate --params {params.settings:q} --training {input.training:q} "
+        "--folds {input.folds:q} --output {output.table:q} {output.predictions:q} > {log:q} 2>&1"
