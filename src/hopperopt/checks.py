@@ -133,23 +133,26 @@ def _network(study):
     chosen, sizes = surrogate.selected_hidden_nodes, surrogate.hidden_nodes
     if len(set(sizes)) < len(sizes):
         yield mistake("surrogate.hidden_nodes", sizes, "numbers that differ")
-    if chosen != "auto" and chosen not in sizes:
+    if chosen != "auto" and chosen not in sizes and surrogate.model != "paper":
         allowed = f"auto or one of {', '.join(map(str, sizes))} (surrogate.hidden_nodes)"
         yield mistake("surrogate.selected_hidden_nodes", chosen, allowed)
     held_out = surrogate.validation_experiments + surrogate.test_experiments
     if count - held_out < 2:
         allowed = f"at most {count - 2} experiments for validation and test together, of {count}"
         yield mistake("surrogate.validation_experiments", surrogate.validation_experiments, allowed)
-    elif surrogate.split == "experiments":
+        return
+    # The comparison of the surrogates leaves one experiment out, whatever the split.
+    judging = surrogate.test_experiments if surrogate.split == "experiments" else 1
+    if surrogate.networks["selected_hidden_nodes"] == "auto" and count - judging < FOLDS:
+        allowed = f"auto only with {FOLDS} experiments or more that are not the test's"
+        yield mistake("surrogate.selected_hidden_nodes", "auto", allowed)
+    if surrogate.split == "experiments":
         yield from _split(study, count, held_out)
 
 
 def _split(study, count, held_out):
-    """Enough whole experiments to train on, and for the cross-validation."""
+    """Enough whole experiments to train on."""
     surrogate = study.surrogate
-    if surrogate.selected_hidden_nodes == "auto" and count - surrogate.test_experiments < FOLDS:
-        allowed = f"auto only with {FOLDS} experiments or more that are not the test's"
-        yield mistake("surrogate.selected_hidden_nodes", "auto", allowed)
     # Two experiments for each factor can always hold its extremes, whichever the draw takes away.
     if count - held_out < 2 * len(study.factors):
         # Slow to import, and rarely needed.

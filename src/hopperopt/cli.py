@@ -64,17 +64,24 @@ STAGES = {
         ("validation.csv", "validation.nc"),
         "compare the surrogates",
     ),
+    "choose": Stage(
+        "surrogate.choice",
+        "choose",
+        ("training", "network", "validation*"),
+        ("model.nc",),
+        "choose the surrogate and fit it",
+    ),
     "optimise": Stage(
         "optimise",
         "optimise",
-        ("network",),
+        ("surrogate",),
         ("front.csv", "history.nc", "selected.yaml"),
         "search the best designs and select one",
     ),
     "verify": Stage(
         "verify",
         "verify",
-        ("simulations*", "network", "designs"),
+        ("simulations*", "surrogate", "designs"),
         ("verdict.csv", "glance.csv"),
         "judge the cases simulated anew",
     ),
@@ -85,10 +92,10 @@ FIGURES = {
     "hopper": ("run",),
     "curves": ("dataset",),
     "fit": ("training", "network"),
-    "verification": ("simulations*", "network"),
+    "verification": ("simulations*", "surrogate"),
     "verdict": ("verdict", "designs"),
     "front": ("front", "dataset", "verdict"),
-    "errors": ("errors",),
+    "errors": ("validation", "surrogate"),
 }
 
 
@@ -153,7 +160,7 @@ def _parser() -> argparse.ArgumentParser:
 def _add_stage(command: argparse.ArgumentParser, stage: Stage) -> None:
     command.add_argument("--params", type=_json, required=True, metavar="JSON", help="configuration")
     for option in stage.inputs:
-        count = {"nargs": "+"} if option.endswith("*") else {}
+        count = {"nargs": "*"} if option.endswith("*") else {}
         command.add_argument(f"--{option.rstrip('*')}", required=True, metavar="FILE", **count)
     command.add_argument("--output", required=True, nargs=len(stage.outputs), metavar=stage.outputs)
     command.set_defaults(action=_run_stage, stage=stage)

@@ -350,13 +350,17 @@ class Validation(Model):
     starts: Count = 20
 
 
-class Surrogate(Model):
-    """The network: filter, split, hidden sizes and starts."""
+PAPER = {"selected_hidden_nodes": 7, "clip_sigma": 3.0}
 
+
+class Surrogate(Model):
+    """The surrogate: which model; filter, split, hidden sizes and starts of networks."""
+
+    model: Literal["auto", "paper", "network", "ensemble", "gaussian"] = "auto"
     clip_sigma: Annotated[float | None, Number(above=0)] = 3.0
     hidden_nodes: Annotated[tuple[Nodes, ...], Field(min_length=1)] = (3, 4, 5, 6, 7, 8, 9, 10)
     starts: Count = 100
-    selected_hidden_nodes: Annotated[int | Literal["auto"], Number(least=1, most=200)] = 7
+    selected_hidden_nodes: Annotated[int | Literal["auto"], Number(least=1, most=200)] = "auto"
     split: Literal["experiments", "points"] = "experiments"
     validation_experiments: Count = 4
     test_experiments: Count = 4
@@ -364,10 +368,22 @@ class Surrogate(Model):
     seed: Seed = 1
 
     @property
-    def validated(self):
-        """Settings of the networks that are compared, as plain values."""
-        networks = {"hidden_nodes", "selected_hidden_nodes", "seed"}
-        return {**self.model_dump(mode="json", include=networks), "starts": self.validation.starts}
+    def networks(self):
+        """Settings of the networks' training, as plain values; of the paper's where it is chosen."""
+        names = {"hidden_nodes", "starts", "selected_hidden_nodes", "seed"}
+        settings = self.model_dump(mode="json", include=names)
+        if self.model == "paper":
+            sizes = sorted({*self.hidden_nodes, PAPER["selected_hidden_nodes"]})
+            settings |= {"hidden_nodes": sizes, "selected_hidden_nodes": PAPER["selected_hidden_nodes"]}
+        return settings
+
+    @property
+    def targets(self):
+        """Settings of the targets, as plain values; the clip is the paper's where its network is chosen."""
+        settings = self.model_dump(
+            include={"clip_sigma", "split", "validation_experiments", "test_experiments", "seed"}
+        )
+        return settings | ({"clip_sigma": PAPER["clip_sigma"]} if self.model == "paper" else {})
 
 
 class Optimise(Model):
@@ -542,15 +558,12 @@ STAGES = {
     "gather": lambda study: {"factors": list(study.factors), "incomplete": study.discharge.incomplete},
     "filter": lambda study: {
         "factors": list(study.factors),
-        **study.surrogate.model_dump(
-            include={"clip_sigma", "split", "validation_experiments", "test_experiments", "seed"}
-        ),
+        **study.surrogate.targets,
     },
-    "train": lambda study: study.surrogate.model_dump(
-        mode="json", include={"hidden_nodes", "starts", "selected_hidden_nodes", "seed"}
-    ),
-    "validate_fold": lambda study: study.surrogate.validated,
-    "validate": lambda study: study.surrogate.validated,
+    "train": lambda study: study.surrogate.networks,
+    "validate_fold": lambda study: study.surrogate.networks | {"starts": study.surrogate.validation.starts},
+    "validate": lambda study: study.surrogate.networks | {"starts": study.surrogate.validation.starts},
+    "choose": lambda study: {"model": study.surrogate.model, **study.surrogate.networks},
     "optimise": lambda study: {
         **study.optimise.model_dump(exclude={"explicit"}),
         "explicit": study.optimise.explicit if study.optimise.select == "explicit" else None,

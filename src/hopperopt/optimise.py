@@ -37,7 +37,7 @@ class Front(NamedTuple):
 
 def optimise(
     params: Mapping,
-    network: str | os.PathLike,
+    surrogate: str | os.PathLike,
     front: str | os.PathLike,
     history: str | os.PathLike,
     selected: str | os.PathLike,
@@ -46,10 +46,10 @@ def optimise(
 
     params: `bounds` {factor: [low, high]}, `population`, `generations`, `crossover_probability`,
     `mutation_probability`, `seed`, `select` (knee, compromise or explicit), `explicit` (a design or None),
-    `centre` (a design), all in the factors' own units. network: path of network.nc; front, history, selected:
+    `centre` (a design), all in the factors' own units. surrogate: path of model.nc; front, history, selected:
     paths of front.csv, history.nc and selected.yaml.
     """
-    predictor = prediction.load(network)
+    predictor = prediction.load(surrogate)
     bounds = np.array([params["bounds"][name] for name in predictor.factors], dtype=float)
     found, record = search(predictor, bounds, params)
     choice = _choose(params, predictor, bounds, found)

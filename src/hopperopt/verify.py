@@ -18,12 +18,12 @@ PLAN_BEST = "plan_best"
 
 
 def verify(
-    params: Mapping, simulations: Iterable, network: str, designs: str, verdict: str, glance: str
+    params: Mapping, simulations: Iterable, surrogate: str, designs: str, verdict: str, glance: str
 ) -> None:
     """Write the verdict, numbers for a row per case and objective, and the same at a glance, in words.
 
     params: `cases`, pairs of name and kind in order; `incomplete`, refuse or drop. simulations: the cases'
-    runs, named CASE_rep_REPLICATE.nc; network: path of network.nc; designs: path of designs.csv. Raises
+    runs, named CASE_rep_REPLICATE.nc; surrogate: path of model.nc; designs: path of designs.csv. Raises
     files.InputError naming the runs that did not end well, unless they are to be dropped; a case without any
     run left has empty cells.
     """
@@ -31,7 +31,7 @@ def verify(
     unusable = dataset.unusable_runs(runs)
     if unusable and params["incomplete"] != "drop":
         raise files.InputError(dataset.refusal(unusable))
-    predictor = prediction.load(network)
+    predictor = prediction.load(surrogate)
     cases, facts = [], []
     for name, kind in params["cases"]:
         own = {key: run for key, run in runs.items() if key[0] == name}

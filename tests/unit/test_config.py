@@ -382,7 +382,8 @@ def test_narrow_outlet_is_a_warning():
 def plan_file(folder, text):
     """Changes that take the plan from a CSV file."""
     (folder / "plan.csv").write_text(text)
-    return {"design": {"plan": "csv"}, "surrogate": {"validation_experiments": 1, "test_experiments": 1}}
+    few = {"validation_experiments": 1, "test_experiments": 1, "selected_hidden_nodes": 7}
+    return {"design": {"plan": "csv"}, "surrogate": few}
 
 
 TWO_FACTORS = {

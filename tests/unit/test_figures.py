@@ -26,7 +26,7 @@ from hopperopt.figures import (
     verdict,
     verification,
 )
-from hopperopt.surrogate import targets
+from hopperopt.surrogate import targets, validation
 
 FIGURES = (hopper, curves, fit, verification, verdict, front, errors)
 BATCH = np.array([8, 27, 64]) / 99
@@ -104,13 +104,16 @@ def run():
     )
 
 
-def table_of_errors(**columns):
+def table_of_methods(*left_out):
     rng = np.random.default_rng(2)
-    sizes = np.arange(3, 11)
-    names = [f"{use}_rmse_{name}" for use in ("training", "validation", "test") for name in style.OBJECTIVES]
-    empty = {f"cross_validation_rmse_{name}": np.nan for name in style.OBJECTIVES}
-    values = {name: rng.uniform(0.01, 0.012, 8) for name in names}
-    return pd.DataFrame({"hidden": sizes, **values, **empty, **columns, "selected": sizes == 7})
+    methods = [name for name in validation.METHODS if name not in left_out]
+    columns = [f"{kind}_{k}" for kind in ("curve_rmse", "objective") for k in "fi"]
+    table = pd.DataFrame({name: rng.uniform(0.003, 0.012, len(methods)) for name in columns}, index=methods)
+    table = table.rename(columns={f"objective_{k}": f"objective_{k}_rmse" for k in "fi"})
+    table["coverage_90"] = rng.uniform(0.3, 0.95, len(methods))
+    no_curve = table.index.isin(["quadratic", "mean_objective"])
+    table.loc[no_curve, ["curve_rmse_f", "curve_rmse_i", "coverage_90"]] = np.nan
+    return table.rename_axis("method").reset_index()
 
 
 def table_of_front(points=30, feasible=True, selected=9):
@@ -290,10 +293,13 @@ def test_nine_of_ten_points_of_a_plan_lie_in_the_bands_around_their_mean(make_pl
     assert np.mean(covered) == pytest.approx(0.9, abs=0.03)
 
 
-def test_errors_can_be_read():
-    check_texts(errors.draw(table_of_errors()))
-    check_texts(errors.draw(table_of_errors(cross_validation_rmse_fine=0.011)))
-    check_texts(errors.draw(table_of_errors().iloc[:1]))
+def test_errors_can_be_read_and_tell_the_surrogate_that_is_used():
+    for chosen, left_out in (("gaussian", ()), ("network", ("network_clipped", "ensemble_clipped"))):
+        figure = errors.draw(table_of_methods(*left_out), chosen)
+        check_texts(figure)
+        words = [text.get_text() for text, _ in written(figure) if text.get_fontweight() == "bold"]
+        assert words == [errors.WORDS[chosen]]
+        assert len(figure.axes[0].get_yticks()) == 10 - len(left_out)
 
 
 def test_hopper_can_be_read(run):
@@ -350,8 +356,9 @@ def test_designs_in_words():
 def test_files_are_the_same_every_time(tmp_path):
     for folder in ("first", "second"):
         paths = [tmp_path / folder / f"errors.{suffix}" for suffix in ("png", "pdf")]
-        table_of_errors().to_csv(tmp_path / "errors.csv", index=False)
-        errors.write({"dpi": 100}, tmp_path / "errors.csv", paths)
+        table_of_methods().to_csv(tmp_path / "validation.csv", index=False)
+        xr.Dataset(attrs={"surrogate": "ensemble"}).to_netcdf(tmp_path / "model.nc")
+        errors.write({"dpi": 100}, tmp_path / "validation.csv", tmp_path / "model.nc", paths)
     for suffix in ("png", "pdf"):
         first, second = (
             (tmp_path / folder / f"errors.{suffix}").read_bytes() for folder in ("first", "second")

@@ -157,6 +157,8 @@ OTHER = {
     "surrogate.split": "points",
     "surrogate.validation_experiments": 2,
     "surrogate.test_experiments": 2,
+    "surrogate.validation.starts": 2,
+    "surrogate.model": "gaussian",
     "surrogate.seed": 2,
     "optimise.population": 10,
     "optimise.generations": 4,

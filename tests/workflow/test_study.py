@@ -18,7 +18,7 @@ OUTPUTS = """
     verification/glance.csv simulations/exp_01_rep_1.nc verification/selected_rep_1.nc
     verification/plan_centre_rep_1.nc verification/bare_rep_1.nc
     logs/simulate/exp_01_rep_1.log logs/simulate/exp_01_rep_1.tsv
-    surrogate/validation/exp_01.nc surrogate/validation.csv surrogate/validation.nc
+    surrogate/validation/exp_01.nc surrogate/validation.csv surrogate/validation.nc surrogate/model.nc
 """
 
 
@@ -108,6 +108,7 @@ def test_the_graph_has_every_rule(finished):
         "train",
         "validate_fold",
         "validate",
+        "choose",
         "optimise",
         "verify_simulate",
         "verify",

@@ -73,6 +73,16 @@ def fold_params(wildcards):
     return as_json(settings, cli.STAGES["validate_fold"].module)
 
 
+def validation_folds():
+    """Files of the surrogates' validation, one for each experiment."""
+    return expand(result("surrogate/validation/{experiment}.nc"), experiment=EXPERIMENTS)
+
+
+def compared_surrogates():
+    """File of the surrogates' comparison, where that chooses one of them."""
+    return [result("surrogate/validation.nc")] if STUDY.surrogate.model == "auto" else []
+
+
 def figure(name):
     """Parameters of a figure."""
     return as_json(STUDY.stage_params("figures"), f"figures.{name}")

@@ -63,7 +63,7 @@ rule figure_verification:
     """Predicted and simulated outflow at the optimum."""
     input:
         simulations=verification_runs(shown_case()),
-        network=result("surrogate/network.nc"),
+        surrogate=result("surrogate/model.nc"),
     output:
         png=report(result("figures/verification.png"), caption="../report/verification.rst", category="Figures"),
         pdf=result("figures/verification.pdf"),
@@ -76,7 +76,7 @@ rule figure_verification:
         mem_mb=1000,
         runtime=5,
     shell:
-        "python -m hopperopt figure verification --params {params.settings:q} --simulations {input.simulations:q} --network {input.network:q} "
+        "python -m hopperopt figure verification --params {params.settings:q} --simulations {input.simulations:q} --surrogate {input.surrogate:q} "
         "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
 
 
@@ -125,9 +125,10 @@ rule figure_front:
 
 
 rule figure_errors:
-    """Errors of the networks against their hidden size."""
+    """The surrogates compared at experiments that they have not seen."""
     input:
-        errors=result("surrogate/errors.csv"),
+        validation=result("surrogate/validation.csv"),
+        surrogate=result("surrogate/model.nc"),
     output:
         png=report(result("figures/errors.png"), caption="../report/errors.rst", category="Figures"),
         pdf=result("figures/errors.pdf"),
@@ -140,5 +141,5 @@ rule figure_errors:
         mem_mb=1000,
         runtime=5,
     shell:
-        "python -m hopperopt figure errors --params {params.settings:q} --errors {input.errors:q} "
-        "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
+        "python -m hopperopt figure errors --params {params.settings:q} --validation {input.validation:q} "
+        "--surrogate {input.surrogate:q} --output {output.png:q} {output.pdf:q} > {log:q} 2>&1"

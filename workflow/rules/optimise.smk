@@ -1,7 +1,7 @@
 rule optimise:
     """Pareto front of the surrogate, and the design selected from it."""
     input:
-        network=result("surrogate/network.nc"),
+        surrogate=result("surrogate/model.nc"),
     output:
         front=report(
             result("optimum/front.csv"), caption="../report/front_table.rst", category="Tables"
@@ -17,5 +17,5 @@ rule optimise:
         mem_mb=1000,
         runtime=15,
     shell:
-        "python -m hopperopt optimise --params {params.settings:q} --network {input.network:q} "
+        "python -m hopperopt optimise --params {params.settings:q} --surrogate {input.surrogate:q} "
         "--output {output.front:q} {output.history:q} {output.selected:q} > {log:q} 2>&1"

@@ -62,7 +62,7 @@ rule validate:
     """All surrogates compared at experiments that they have not seen."""
     input:
         training=result("surrogate/training.nc"),
-        folds=expand(result("surrogate/validation/{experiment}.nc"), experiment=EXPERIMENTS),
+        folds=validation_folds(),
     output:
         table=report(
             result("surrogate/validation.csv"), caption="../report/validation.rst", category="Tables"
@@ -79,3 +79,24 @@ rule validate:
     shell:
         "python -m hopperopt validate --params {params.settings:q} --training {input.training:q} "
         "--folds {input.folds:q} --output {output.table:q} {output.predictions:q} > {log:q} 2>&1"
+
+
+rule choose:
+    """The surrogate that the study goes on with."""
+    input:
+        training=result("surrogate/training.nc"),
+        network=result("surrogate/network.nc"),
+        validation=compared_surrogates(),
+    output:
+        model=result("surrogate/model.nc"),
+    log:
+        log_of("choose"),
+    params:
+        settings=stage("choose"),
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    shell:
+        "python -m hopperopt choose --params {params.settings:q} --training {input.training:q} "
+        "--network {input.network:q} --validation {input.validation:q} --output {output.model:q} > {log:q} 2>&1"

@@ -23,7 +23,7 @@ rule verify:
     """What the runs of the verification say of the predictions, and against the bare hopper."""
     input:
         simulations=[verification_runs(case) for case in CASES],
-        network=result("surrogate/network.nc"),
+        surrogate=result("surrogate/model.nc"),
         designs=result("designs.csv"),
     output:
         verdict=report(
@@ -42,5 +42,5 @@ rule verify:
         runtime=5,
     shell:
         "python -m hopperopt verify --params {params.settings:q} --simulations {input.simulations:q} "
-        "--network {input.network:q} --designs {input.designs:q} "
+        "--surrogate {input.surrogate:q} --designs {input.designs:q} "
         "--output {output.verdict:q} {output.glance:q} > {log:q} 2>&1"

@@ -46,7 +46,7 @@ def draw(front: pd.DataFrame, dataset: xr.Dataset, verdict: pd.DataFrame) -> Fig
     """
     figure = style.page(style.PAGE, 78)
     near, far = style.panels(figure, 1, 2, style.Frame(15, 3.5, 8.5, 10), (17, 0))[0]
-    for panel, title in ((near, "predicted by the network"), (far, "simulated, noise subtracted")):
+    for panel, title in ((near, "predicted by the surrogate"), (far, "simulated, noise subtracted")):
         panel.set(xlabel=style.OBJECTIVES["fine"], ylabel=style.OBJECTIVES["intermediate"])
         panel.set_title(title, loc="left")
         panel.locator_params(nbins=6)

@@ -12,7 +12,7 @@ from hopperopt import files, outflow
 from hopperopt.figures import labels, style
 from hopperopt.surrogate import features, prediction
 
-NETWORK = {"marker": "o", "markersize": 2.6, "linewidth": 0.8, "clip_on": False}
+PREDICTED = {"marker": "o", "markersize": 2.6, "linewidth": 0.8, "clip_on": False}
 SIMULATION = {"linestyle": "", "marker": "o", "markersize": 4, "markerfacecolor": "none", "clip_on": False}
 BAND = {"linewidth": 5, "color": style.FAINT, "alpha": 0.5, "solid_capstyle": "butt"}
 SIGMAS = 1.64  # nine of ten points of a smooth curve's simulation lie within them
@@ -21,11 +21,11 @@ SIGMAS = 1.64  # nine of ten points of a smooth curve's simulation lie within th
 def write(
     params: Mapping,
     simulations: Sequence[str | os.PathLike],
-    network: str | os.PathLike,
+    surrogate: str | os.PathLike,
     outputs: Sequence[str | os.PathLike],
 ) -> None:
-    """Draw a case; params: `dpi`; simulations: the files of its runs; network: path of network.nc."""
-    runs, predictor = [files.read_netcdf(path) for path in simulations], prediction.load(network)
+    """Draw a case; params: `dpi`; simulations: the files of its runs; surrogate: path of model.nc."""
+    runs, predictor = [files.read_netcdf(path) for path in simulations], prediction.load(surrogate)
     design = json.loads(runs[0].attrs["case"])["design"]
     predicted = predictor.curves(predictor.array(design))[0] if design else None
     usable = [run for run in runs if run["status"].item() == "complete"]
@@ -43,7 +43,7 @@ def draw(
 
     batch (output,): mass fractions m_k0; predicted (output, M), None for a hopper without an insert. The band
     around the prediction (without one, around the batch's mass fraction) is 1.64 standard deviations of the
-    simulation's counting noise: where the network is right, nine points of ten lie in it.
+    simulation's counting noise: where it is right, nine points of ten lie in it.
     """
     figure = style.page(style.COLUMN, 72)
     axes = style.panels(figure, 1, 1, style.Frame(11.5, 7, 8.5, 10.5), (0, 0))[0, 0]
@@ -53,7 +53,7 @@ def draw(
         middle = np.full(outflow.GRID.size, batch[k]) if predicted is None else predicted[k]
         axes.axhline(batch[k], color=colour, linewidth=0.5, alpha=0.7)
         if predicted is not None:
-            axes.plot(outflow.GRID, middle, color=colour, **NETWORK)
+            axes.plot(outflow.GRID, middle, color=colour, **PREDICTED)
         if runs:
             limits = middle - SIGMAS * noise[k], middle + SIGMAS * noise[k]
             axes.fill_between(outflow.GRID, *limits, color=colour, alpha=0.18, linewidth=0)
@@ -79,7 +79,7 @@ def _simulated(runs):
 
 def _meanings(runs, predicted):
     """What lines and marks mean, see style.key."""
-    meanings = {"network": NETWORK} if predicted else {}
+    meanings = {"prediction": PREDICTED} if predicted else {}
     if not runs:
         return {**meanings, "no complete simulation": {"linestyle": ""}}
     words = "simulation" if runs == 1 else f"{runs} simulations"
