@@ -18,9 +18,8 @@ import xarray as xr
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
-from threadpoolctl import threadpool_limits
 
-from hopperopt.surrogate.network import range_scaling
+from hopperopt.surrogate.network import one_thread, range_scaling
 
 LENGTHS = (
     0.5,
@@ -46,6 +45,7 @@ class Gaussian(NamedTuple):
     variances: np.ndarray  # (c,) of the processes
     lengths: np.ndarray  # (c, factors) of the processes, in half ranges of the factors
 
+    @one_thread
     def moments(self, designs: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and variance, (n, outputs, m) each, of the curves without noise, at the M of the training."""
         inputs = self._scaled(designs)
@@ -58,6 +58,7 @@ class Gaussian(NamedTuple):
         mean = self.mean + np.einsum("nc,com->nom", scores, self.components)
         return mean, own + self.scale**2 * (shared + self.rest)
 
+    @one_thread
     def draws(self, designs: np.ndarray, M: np.ndarray, number: int, rng: np.random.Generator) -> np.ndarray:
         """Draw curves without noise, joint over the designs: (number, n, outputs, m)."""
         inputs = self._scaled(designs)
@@ -85,6 +86,7 @@ class Gaussian(NamedTuple):
             yield process.fit(self._scaled(self.designs), scores)
 
 
+@one_thread
 def fit(data: xr.Dataset) -> Gaussian:
     """Fit the processes to the mean curves of the experiments, never clipped.
 
@@ -101,9 +103,7 @@ def fit(data: xr.Dataset) -> Gaussian:
     departures = ((curves - mean) / scale).reshape(len(curves), -1)
     directions, rest = _components(departures, noise.mean())
     scores, inputs = departures @ directions.T, range_scaling(designs).normalise(designs)
-    # One thread: the matrices are small.
-    with threadpool_limits(1, user_api="blas"):
-        found = [_hyperparameters(inputs, score, noise) for score in scores.T]
+    found = [_hyperparameters(inputs, score, noise) for score in scores.T]
     variances, lengths = (np.array(part) for part in zip(*found, strict=True))
     from_batch, mean_variance = _shrunk(mean - batch[:, None], scale, noise.mean() / len(curves))
     error = noise.mean() / np.sum(scores**2, axis=0)[:, None, None]

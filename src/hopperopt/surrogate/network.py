@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from hopperopt.surrogate import features
+
 # Decorates what multiplies matrices: the bits of large products depend on the number of BLAS' threads.
 one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
-
-from hopperopt.surrogate import features
 
 CHUNK = 50_000  # rows predicted at a time, to bound the memory
 
