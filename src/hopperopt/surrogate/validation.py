@@ -57,7 +57,9 @@ def validate(
         hits = [row.get(f"coverage_{k}_hits", np.nan) for k in "fi"]
         if np.isfinite(hits).all():
             word = "consistent" if min(hits) >= least_hits(number) else "miscalibrated"
-            log.info(f"{name}: U of {hits[0]} and {hits[1]} of {number} experiments in its limits: {word}")
+            log.info(
+                f"{name}: U of {hits[0]:.0f} and {hits[1]:.0f} of {number} experiments in its limits: {word}"
+            )
 
 
 def least_hits(number: int) -> int:
