@@ -39,7 +39,8 @@ def verify(
         design = json.loads(next(iter(own.values())).attrs["case"])["design"]
         cases.append(Case(name, kind, predict(predictor, design), curves(usable)))
         times = [float(run["discharge_time"]) for run in usable]
-        facts.append({**design, "discharge_time_s": np.mean(times) if times else np.nan})
+        factors = {factor: design.get(factor, np.nan) for factor in predictor.factors}
+        facts.append({**factors, "discharge_time_s": np.mean(times) if times else np.nan})
     table = judge(cases, dataset.common_target(runs))
     files.write_table(table[list(COLUMNS)], verdict)
     files.write_table(at_a_glance(table, facts, params["cases"], files.read_table(designs)), glance)
