@@ -17,7 +17,10 @@ the study's step.
   (δ_fs - m_f)²) / sum of c_s w_s, with number c_s and mass w_s of each class s. The rms over the bins is at
   most 1.5 times that (by chance 1 ± 0.18). So what segregates in the outflow does so during the outflow.
 - The share of an experiment's computing time that filling and settling take. The aim of 40 % is not a
-  matter of right or wrong and is not judged: a faster filling would have to leave beds as random as these.
+  matter of right or wrong and is not judged: a faster filling would have to leave beds like these. A column
+  of solid fraction 0.3 instead of 0.2 does not: it is as well mixed and takes 41 % of the time, 40 % when it
+  falls at 1 m/s instead of 0.5, but its core packs to 0.578 and 0.581 in the centre design (five seeds each)
+  where these beds have 0.586. So the study keeps its rain.
 """
 
 import numpy as np
