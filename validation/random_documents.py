@@ -227,6 +227,7 @@ def _run(study, folder):
             [folder / f"{name}_rep_1.nc"],
             folder / "dataset.nc",
             folder / "runs.csv",
+            folder / "designs.csv",
         )
     except files.InputError as error:
         taken = False
