@@ -133,7 +133,7 @@ def _document(rng):
         # A study needs a plan; here it is of no account.
         "factors": {"gravity_m_s2": {"key": "simulation.gravity_m_s2", "levels": [9.8, 9.81]}},
         "design": {"plan": "lhs", "lhs": {"experiments": 4}},
-        "surrogate": {"validation_experiments": 1, "test_experiments": 1},
+        "surrogate": {"selected_hidden_nodes": 7, "validation_experiments": 1, "test_experiments": 1},
         "verification": {"cases": {"bare": "bare"}},
     }
     rayleigh = config.Particles.model_validate(document["particles"]).rayleigh_time
