@@ -37,6 +37,8 @@ def sample(count, beyond=False, seed=SEED):
     rng = np.random.default_rng(seed)
     cases, refused, warned = [], Counter(), Counter()
     while len(cases) < count:
+        if refused.total() > 50 * count:
+            raise RuntimeError(f"nearly all random designs are refused: {dict(refused)}")
         document = _document(rng)
         try:
             study = config.parse(document)

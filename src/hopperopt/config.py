@@ -350,7 +350,7 @@ class Validation(Model):
     starts: Count = 20
 
 
-PAPER = {"selected_hidden_nodes": 7, "clip_sigma": 3.0}
+PAPERS_NETWORK = {"selected_hidden_nodes": 7, "clip_sigma": 3.0}
 
 
 class Surrogate(Model):
@@ -373,8 +373,8 @@ class Surrogate(Model):
         names = {"hidden_nodes", "starts", "selected_hidden_nodes", "seed"}
         settings = self.model_dump(mode="json", include=names)
         if self.model == "paper":
-            sizes = sorted({*self.hidden_nodes, PAPER["selected_hidden_nodes"]})
-            settings |= {"hidden_nodes": sizes, "selected_hidden_nodes": PAPER["selected_hidden_nodes"]}
+            sizes = sorted({*self.hidden_nodes, PAPERS_NETWORK["selected_hidden_nodes"]})
+            settings |= {"hidden_nodes": sizes, "selected_hidden_nodes": PAPERS_NETWORK["selected_hidden_nodes"]}
         return settings
 
     @property
@@ -383,7 +383,7 @@ class Surrogate(Model):
         settings = self.model_dump(
             include={"clip_sigma", "split", "validation_experiments", "test_experiments", "seed"}
         )
-        return settings | ({"clip_sigma": PAPER["clip_sigma"]} if self.model == "paper" else {})
+        return settings | ({"clip_sigma": PAPERS_NETWORK["clip_sigma"]} if self.model == "paper" else {})
 
 
 class Optimise(Model):
@@ -398,7 +398,7 @@ class Optimise(Model):
     explicit: dict[Name, Finite] = {}
 
 
-PAPER = {"theta_deg": 56.7, "length_mm": 32.4, "height_mm": 33.0}  # the optimum of Yu and Saxén
+PAPERS_OPTIMUM = {"theta_deg": 56.7, "length_mm": 32.4, "height_mm": 33.0}  # the optimum of Yu and Saxén
 FIXED = ("plan_centre", "bare")
 DERIVED = ("selected", "best_f", "best_i", "plan_best")
 
@@ -426,7 +426,7 @@ class Verification(Model):
     replicates_of: dict[Name, Count] = {"selected": 20, "plan_best": 20}
     cases: Annotated[dict[Name, Case], Field(min_length=1, max_length=plans.MOST_EXPERIMENTS)] = {
         **{word: word for word in (*DERIVED, "plan_centre")},
-        "paper": PAPER,
+        "paper": PAPERS_OPTIMUM,
         "bare": "bare",
     }
 
@@ -619,9 +619,9 @@ def parse(document, directory="."):
 def _with_its_cases(study):
     """The study without the default case that is a design of the paper's, where its factors are others."""
     verification = study.verification
-    if "cases" in verification.model_fields_set or set(study.factors) == set(PAPER):
+    if "cases" in verification.model_fields_set or set(study.factors) == set(PAPERS_OPTIMUM):
         return study
-    cases = {name: case for name, case in verification.cases.items() if case != PAPER}
+    cases = {name: case for name, case in verification.cases.items() if case != PAPERS_OPTIMUM}
     return study.model_copy(update={"verification": verification.model_copy(update={"cases": cases})})
 
 
