@@ -373,8 +373,8 @@ class Surrogate(Model):
         names = {"hidden_nodes", "starts", "selected_hidden_nodes", "seed"}
         settings = self.model_dump(mode="json", include=names)
         if self.model == "paper":
-            sizes = sorted({*self.hidden_nodes, PAPERS_NETWORK["selected_hidden_nodes"]})
-            settings |= {"hidden_nodes": sizes, "selected_hidden_nodes": PAPERS_NETWORK["selected_hidden_nodes"]}
+            nodes = PAPERS_NETWORK["selected_hidden_nodes"]
+            settings |= {"hidden_nodes": sorted({*self.hidden_nodes, nodes}), "selected_hidden_nodes": nodes}
         return settings
 
     @property
