@@ -46,9 +46,10 @@ class Killed(Study):
         self.results = self.directory / "results"
         for name in ("dataset.nc", *(f"simulations/{run}.nc" for run in TO_DO)):
             (self.results / name).unlink()
-        # The selected design follows from all of the plan.
-        runs = [path for path in self.results.glob("*/*_rep_*.nc") if "selected" not in path.name]
-        self.done = {path: path.stat() for path in runs}
+        # The designs of the other cases follow from all of the plan.
+        fixed = ("simulations/*", "verification/plan_centre_*", "verification/bare_*")
+        self.done = {path: path.stat() for name in fixed for path in self.results.glob(f"{name}.nc")}
+        assert len(self.done) == 5
         self.hold = self.directory / "hold"
         self.hold.touch()
         self.started = []
