@@ -108,7 +108,7 @@ def test_saving_changes_no_bit(undisturbed, saved):
     assert max(state["counters"][CHUNKS] for state in states) > 1
 
 
-@pytest.mark.parametrize(("threads", "every"), [(1, 1), (2, 9), pytest.param(2, 1, marks=pytest.mark.full)])
+@pytest.mark.parametrize(("threads", "every"), [(1, 1), (2, 20), pytest.param(2, 1, marks=pytest.mark.full)])
 def test_the_run_goes_on_from_every_state(case, saved, threads, every):
     """From the first sample of the filling to the last of the discharge, each one leads to the next."""
     _, states = saved
