@@ -373,7 +373,7 @@ def comments_changed(study):
 
 @change("the command of a rule, here `optimise`", FULL)
 def command_changed(study):
-    study.edit_code("workflow/rules/optimise.smk", "--network ", "--network  ")
+    study.edit_code("workflow/rules/optimise.smk", "--surrogate ", "--surrogate  ")
     return study.planned()
 
 
