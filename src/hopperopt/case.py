@@ -3,11 +3,11 @@
 import math
 
 from hopperopt import geometry
+from hopperopt.monitors import MAX_SPEED_RATIO
 
 MM = 1000.0
 HEADROOM = 0.020  # m of wall above the particles that start, and their first rise
 SCATTERS = 5  # standard deviations of the speed that the fastest particle has upwards
-REBOUND = 2  # times free fall: the fastest particle in a run that counts
 
 
 def simulation(setup, labels, seed):
@@ -82,4 +82,4 @@ def _rim(setup):
     """Point r, z of the wall's upper end: no particle rises above it that keeps the bound of the speed."""
     start = setup.filling.speed_m_s + SCATTERS * setup.filling.speed_scatter_m_s
     head = _wall_top(setup) + start * start / (2 * setup.simulation.gravity_m_s2)
-    return [setup.hopper.cylinder_radius_mm / MM, round(float(REBOUND**2 * head), geometry.DECIMALS)]
+    return [setup.hopper.cylinder_radius_mm / MM, round(float(MAX_SPEED_RATIO**2 * head), geometry.DECIMALS)]

@@ -13,7 +13,15 @@ import xarray as xr
 from hopperopt.dem import checkpoint as solver
 from hopperopt.dem.materials import contact_law
 from hopperopt.dem.simulation import NotFinite, Simulation
-from hopperopt.monitors import EnergyWatch, Envelope, FlowPattern, filling_level
+from hopperopt.monitors import (
+    MAX_ENERGY_GAIN,
+    MAX_OVERLAP,
+    MAX_SPEED_RATIO,
+    EnergyWatch,
+    Envelope,
+    FlowPattern,
+    filling_level,
+)
 from hopperopt.packing import scatter
 
 SAMPLE_TIME = 0.01  # s between two looks at the state
@@ -23,8 +31,6 @@ SETTLED_SINKING = 0.01  # coarse diameters
 RESIDUAL_SHARE = 1.0e-3  # of the mass: what may stay in a hopper that counts as empty
 RATE_SHARE = (0.2, 0.6)  # of the mass discharged, for the mean rate
 PROGRESS_TIME = 1.0  # s between two reports
-# What the monitors may reach in a run that counts.
-MAX_OVERLAP, MAX_SPEED_RATIO, MAX_ENERGY_GAIN = 0.3, 2.0, 0.01
 CLASSES = 3
 # Every field of an experiment, beside those of its simulation, that the run changes.
 EVOLVING = (

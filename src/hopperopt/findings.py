@@ -9,6 +9,7 @@ from typing import NamedTuple
 from hopperopt import case as cases
 from hopperopt import geometry, impact
 from hopperopt.dem.materials import contact_law
+from hopperopt.monitors import MAX_OVERLAP, MAX_SPEED_RATIO
 
 MM = 1000.0
 SMALLEST_GAP, USUAL_GAP = 2, 3  # coarse diameters between insert and wall
@@ -172,7 +173,8 @@ def _hard_impacts(setup):
     if compression > USUAL_COMPRESSION:
         text = (
             f"a coarse sphere that falls at {speed:.2g} m/s may compress a fine one by {compression:.2f} of "
-            f"its radius{{where}}; usual: at most {USUAL_COMPRESSION} (a run that exceeds 0.3 is refused)"
+            f"its radius{{where}}; usual: at most {USUAL_COMPRESSION} "
+            f"(a run that exceeds {MAX_OVERLAP} is refused)"
         )
         yield Finding("particles.shear_modulus_pa", "soft", compression, text)
     swing = impact.swing(fine, coarse, spheres.density_kg_m3, moduli, compression, setup.time_step)
@@ -192,7 +194,7 @@ def _hard_impacts(setup):
         text = (
             f"{contact.particle.restitution:g}{{where}}: fine spheres may rebound from coarse ones at "
             f"{rebound:.2f} times the speed of free fall, or more after several hits; usual: at most "
-            f"{USUAL_REBOUND} and a restitution of 0.8 (a run that exceeds 2 is refused)"
+            f"{USUAL_REBOUND} and a restitution of 0.8 (a run that exceeds {MAX_SPEED_RATIO:g} is refused)"
         )
         yield Finding("contact.particle.restitution", "rebound", rebound, text)
 

@@ -4,6 +4,8 @@ from itertools import pairwise
 
 import numpy as np
 
+# What the monitors may reach in a run that counts.
+MAX_OVERLAP, MAX_SPEED_RATIO, MAX_ENERGY_GAIN = 0.3, 2.0, 0.01
 MIN_SPHERES = 20  # fewer per sample in either region, and the mass-flow index is not told
 FLOW_BAND = (0.030, 0.060)  # m above the outlet
 FLOW_SHARE = (0.05, 0.35)  # of the mass discharged

@@ -118,8 +118,7 @@ class _Segregation(Problem):
         self.predictor = predictor
 
     def _evaluate(self, designs, out, *args, **kwargs):
-        curves = self.predictor.curves(designs)
-        out["F"] = self.predictor.objectives(designs)
+        curves, out["F"] = self.predictor.predict(designs)
         out["G"] = violation(curves)[:, None]
 
 

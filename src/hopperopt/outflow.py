@@ -86,8 +86,3 @@ def corrected_square(
 def signed_root(square: np.ndarray | float) -> np.ndarray:
     """sign(U) sqrt|U|: a corrected square as tables print it."""
     return np.sign(square) * np.sqrt(np.abs(square))
-
-
-def counting_floor(variance: np.ndarray) -> np.ndarray:
-    """J that counting noise alone gives: sqrt(mean over M of s^2), variance (..., M)."""
-    return np.sqrt(np.mean(variance, axis=-1))

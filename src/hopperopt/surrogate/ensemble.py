@@ -1,13 +1,11 @@
 """An ensemble of networks: the best start of each of five folds of whole experiments."""
 
-import numpy as np
 import xarray as xr
 
 from hopperopt.surrogate.estimator import NetworkRegressor
 from hopperopt.surrogate.network import Ensemble
 from hopperopt.surrogate.split import TRAINING, folds
-from hopperopt.surrogate.targets import clip_limits
-from hopperopt.surrogate.training import FOLDS, Points, read_points
+from hopperopt.surrogate.training import FOLDS, Points, fit_clipped, read_points
 
 
 def fit(data: xr.Dataset, hidden_nodes: int, starts: int, clip_sigma: float, seed: int) -> Ensemble:
@@ -22,12 +20,8 @@ def fit(data: xr.Dataset, hidden_nodes: int, starts: int, clip_sigma: float, see
     fold = folds(points.groups, number, seed)
     members = []
     for stopping in (fold == member for member in range(number)):
-        low, high = clip_limits(points.targets[~stopping].T[None], True, clip_sigma)
-        regressor = NetworkRegressor(hidden_nodes, starts, seed).fit(
-            points.inputs[~stopping],
-            np.clip(points.targets[~stopping], low, high),
-            (points.inputs[stopping], points.targets[stopping]),
-        )
+        regressor = NetworkRegressor(hidden_nodes, starts, seed)
+        fit_clipped(regressor, points, ~stopping, stopping, clip_sigma)
         members.append(regressor.network_)
     return Ensemble(tuple(members))
 

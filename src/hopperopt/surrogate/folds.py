@@ -52,8 +52,8 @@ def predict(others: xr.Dataset, design: np.ndarray, runs: int, params: Mapping) 
     for name, model in _models(others, params).items():
         predictor = Predictor((), others["M"].values, batch, model)
         draws = predictor.draws(design[None], DRAWS, rng)[:, 0]
-        J = predictor.objectives(design[None])[0]
-        found[name] = predictor.curves(design[None])[0], J, *_limits(draws, noise, runs, batch, rng)
+        curves, J = predictor.predict(design[None])
+        found[name] = curves[0], J[0], *_limits(draws, noise, runs, batch, rng)
     curve = others["target"].mean("experiment").transpose("output", "M").values
     draws = np.broadcast_to(curve, (DRAWS, *curve.shape))
     found["mean_curve"] = curve, objective(curve, batch), *_limits(draws, noise, runs, batch, rng)

@@ -35,20 +35,24 @@ class Predictor(NamedTuple):
 
     def curves(self, designs: np.ndarray) -> np.ndarray:
         """Mass fractions m_k(M), (n, outputs, m), of designs (n, factors) in the factors' order and units."""
-        return self.model.moments(designs, self.M)[0]
+        return self.predict(designs)[0]
 
     def draws(self, designs: np.ndarray, number: int, rng: np.random.Generator) -> np.ndarray:
         """Curves that may be the true ones, joint over the designs: (number, n, outputs, m)."""
         return self.model.draws(designs, self.M, number, rng)
 
     def objectives(self, designs: np.ndarray) -> np.ndarray:
-        """J_k of designs (n, factors): (n, outputs), sqrt(E[J^2]) over what the curves may be.
+        """J_k of designs (n, factors): (n, outputs), sqrt(E[J^2]) over what the curves may be."""
+        return self.predict(designs)[1]
+
+    def predict(self, designs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Curves (n, outputs, m) and J_k (n, outputs) of designs (n, factors), at the cost of one of them.
 
         E[J^2] is the square of the mean curve's J and the variance of the curves, averaged over M; of a
         single network it is the plain J^2 of its curve.
         """
         mean, variance = self.model.moments(designs, self.M)
-        return np.sqrt(objective(mean, self.batch) ** 2 + variance.mean(axis=-1))
+        return mean, np.sqrt(objective(mean, self.batch) ** 2 + variance.mean(axis=-1))
 
     def array(self, design: Mapping[str, float]) -> np.ndarray:
         """A design {factor: value} as an array (1, factors). Raises files.InputError for other names."""

@@ -99,23 +99,32 @@ def cross_validate(points: Points, params: Mapping, clip_sigma: float) -> dict[i
     three train, clipped to limits of their own. Rows of the test take no part.
     Returns {hidden size: rmse (outputs,)} against targets as simulated.
     """
-    kept = points.use != TEST
-    inputs, targets, groups = points.inputs[kept], points.targets[kept], points.groups[kept]
-    if len(np.unique(groups)) < FOLDS:
+    points = Points(*(part[points.use != TEST] for part in points))
+    if len(np.unique(points.groups)) < FOLDS:
         raise InputError(f"selected_hidden_nodes: auto needs {FOLDS} experiments that are not the test's")
-    fold = folds(groups, FOLDS, params["seed"])
-    squares = {size: np.zeros(targets.shape[1]) for size in params["hidden_nodes"]}
+    fold = folds(points.groups, FOLDS, params["seed"])
+    squares = {size: np.zeros(points.targets.shape[1]) for size in params["hidden_nodes"]}
     for judging in range(FOLDS):
         judged, stopping = fold == judging, fold == (judging + 1) % FOLDS
-        training = ~judged & ~stopping
-        low, high = clip_limits(targets[training].T[None], True, clip_sigma)
-        clipped = np.clip(targets[training], low, high)
         for size in squares:
-            regressor = NetworkRegressor(size, params["starts"], params["seed"]).fit(
-                inputs[training], clipped, (inputs[stopping], targets[stopping])
-            )
-            squares[size] += np.sum((regressor.predict(inputs[judged]) - targets[judged]) ** 2, axis=0)
-    return {size: np.sqrt(total / len(targets)) for size, total in squares.items()}
+            regressor = NetworkRegressor(size, params["starts"], params["seed"])
+            fit_clipped(regressor, points, ~judged & ~stopping, stopping, clip_sigma)
+            missed = regressor.predict(points.inputs[judged]) - points.targets[judged]
+            squares[size] += np.sum(missed**2, axis=0)
+    return {size: np.sqrt(total / len(points.targets)) for size, total in squares.items()}
+
+
+def fit_clipped(
+    regressor: NetworkRegressor, points: Points, trained: np.ndarray, stopping: np.ndarray, clip_sigma: float
+) -> NetworkRegressor:
+    """Fit a regressor to the rows `trained`, clipped to limits of their own; the rows `stopping` stop it.
+
+    trained, stopping: masks (n,); clip_sigma: the limits in standard deviations, infinite for none.
+    """
+    targets = points.targets[trained]
+    low, high = clip_limits(targets.T[None], True, clip_sigma)
+    validation = points.inputs[stopping], points.targets[stopping]
+    return regressor.fit(points.inputs[trained], np.clip(targets, low, high), validation)
 
 
 def _variances(points):

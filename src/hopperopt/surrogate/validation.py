@@ -19,8 +19,7 @@ from hopperopt.surrogate import gaussian
 from hopperopt.surrogate.estimator import NetworkRegressor
 from hopperopt.surrogate.folds import BASELINE, CLIPPED, DRAWS, QUANTILES, simulations
 from hopperopt.surrogate.split import TEST, TRAINING, VALIDATION, split_points
-from hopperopt.surrogate.targets import clip_limits
-from hopperopt.surrogate.training import choose_size, read_points
+from hopperopt.surrogate.training import choose_size, fit_clipped, read_points
 
 METHODS = (
     "network", f"network{CLIPPED}", "ensemble", f"ensemble{CLIPPED}", "gaussian", "quadratic",
@@ -134,12 +133,8 @@ def random_points(data: xr.Dataset, params: Mapping) -> dict[str, float]:
     points = read_points(data.assign(split=(("experiment", "M"), labels)))
     size, _ = choose_size(points, params, data.attrs["clip_sigma"])
     trained, stopping, test = (points.use == use for use in (TRAINING, VALIDATION, TEST))
-    low, high = clip_limits(points.targets[trained].T[None], True, data.attrs["clip_sigma"])
-    regressor = NetworkRegressor(size, params["starts"], params["seed"]).fit(
-        points.inputs[trained],
-        np.clip(points.targets[trained], low, high),
-        (points.inputs[stopping], points.targets[stopping]),
-    )
+    regressor = NetworkRegressor(size, params["starts"], params["seed"])
+    fit_clipped(regressor, points, trained, stopping, data.attrs["clip_sigma"])
     squares = (regressor.predict(points.inputs[test]) - points.targets[test]) ** 2
     return _row(squares.mean(axis=0), np.full(squares.shape[1], np.nan))
 
