@@ -37,11 +37,13 @@ class Experiment(NamedTuple):
 
 
 def l25(factors):
-    """The orthogonal array L25(5^6): `factors` maps up to six names to five levels each."""
-    from pydoe import get_orthogonal_array  # slow to import
+    """The orthogonal array L25(5^6): `factors` maps up to six names to five levels each.
 
-    array = get_orthogonal_array("L25(5^6)")[:, : len(factors)]
-    rows = [[int(index) for index in row] for row in array]
+    Columns i, j, and ki + j modulo 5 for k = 1 to 4 (Bose's construction): any two hold each
+    pair of levels once.
+    """
+    columns = slice(len(factors))
+    rows = [[i, j, *((k * i + j) % 5 for k in range(1, 5))][columns] for i, j in product(range(5), repeat=2)]
     return [
         Experiment(
             name,

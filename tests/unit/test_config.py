@@ -884,7 +884,7 @@ def test_missing_and_binary_files(tmp_path):
 
 
 def test_parsing_imports_no_slow_module():
-    slow = "{'scipy', 'sklearn', 'pymoo', 'matplotlib', 'numba', 'pandas', 'xarray', 'pydoe'}"
+    slow = "{'scipy', 'sklearn', 'pymoo', 'matplotlib', 'numba', 'pandas', 'xarray'}"
     code = f"import sys; import hopperopt.config; print(sorted({slow} & set(sys.modules)))"
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert shown.strip() == "[]"

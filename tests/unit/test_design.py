@@ -32,6 +32,12 @@ def test_every_pair_of_levels_of_two_columns_comes_once(count):
         assert pairs == set(product(range(1, 6), repeat=2))
 
 
+def test_array_has_its_usual_order():
+    plan = design.l25({f"f{k}": range(5) for k in range(6)})
+    rows = {experiment.name: tuple(experiment.levels.values()) for experiment in plan}
+    assert (rows["exp_02"], rows["exp_08"]) == ((1, 2, 2, 2, 2, 2), (2, 3, 4, 5, 1, 2))
+
+
 def test_level_numbers_name_the_levels():
     for experiment in design.l25(FACTORS):
         for factor, number in experiment.levels.items():
