@@ -57,7 +57,8 @@ def gather(
     unusable = unusable_runs(simulated)
     if unusable and params["incomplete"] != "drop":
         raise files.InputError(refusal(unusable))
-    plan = files.read_table(design).set_index("experiment")[list(params["factors"])]
+    plan = files.read_table(design, "experiment", *params["factors"])
+    plan = plan.set_index("experiment")[list(params["factors"])]
     dataset = assemble(plan, simulated, unusable)
     files.write_netcdf(dataset, output)
     files.write_table(table_of_runs(dataset), runs)

@@ -108,9 +108,7 @@ def read_netcdf(path: str | os.PathLike) -> xr.Dataset:
         raise
     except (OSError, RuntimeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InputError(
-            f"{path}: is damaged or no netCDF file ({reason}); delete it, and snakemake makes it anew"
-        ) from None
+        raise _damaged(path, "netCDF file", reason) from None
 
 
 def write_table(table: pd.DataFrame, path: str | os.PathLike) -> None:
@@ -119,9 +117,16 @@ def write_table(table: pd.DataFrame, path: str | os.PathLike) -> None:
         table.to_csv(temporary, index=False, float_format="%.10g", lineterminator="\n")
 
 
-def read_table(path: str | os.PathLike) -> pd.DataFrame:
-    """Read a CSV table."""
-    return pd.read_csv(path)
+def read_table(path: str | os.PathLike, *columns: str) -> pd.DataFrame:
+    """Read a CSV table; InputError when it is damaged, has no row or lacks one of the columns."""
+    try:
+        table = pd.read_csv(path)
+    except ValueError as error:  # of pandas' parser, and of text that is no UTF-8
+        raise _damaged(path, "CSV table", " ".join(str(error).split())) from None
+    missing = [column for column in columns if column not in table]
+    if missing or table.empty:
+        raise _damaged(path, "CSV table", f"no column {missing[0]}" if missing else "no row")
+    return table
 
 
 def write_yaml(document: Mapping, path: str | os.PathLike) -> None:
@@ -132,9 +137,22 @@ def write_yaml(document: Mapping, path: str | os.PathLike) -> None:
         )
 
 
-def read_yaml(path: str | os.PathLike) -> dict:
-    """Read a YAML mapping."""
-    return yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+def read_yaml(path: str | os.PathLike, *keys: str) -> dict:
+    """Read a YAML mapping; InputError when it is damaged or lacks one of the keys."""
+    try:
+        document = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except (ValueError, yaml.YAMLError) as error:
+        raise _damaged(path, "YAML file", " ".join(str(error).split())) from None
+    if not isinstance(document, dict):
+        raise _damaged(path, "YAML file", "no mapping")
+    if missing := [key for key in keys if key not in document]:
+        raise _damaged(path, "YAML file", f"no key {missing[0]}")
+    return document
+
+
+def _damaged(path, kind, reason):
+    """What to say of a result that cannot be read."""
+    return InputError(f"{path}: is damaged or no {kind} ({reason}); delete it, and snakemake makes it anew")
 
 
 def _plain(value):

@@ -43,7 +43,7 @@ def verify(
         facts.append({**factors, "discharge_time_s": np.mean(times) if times else np.nan})
     table = judge(cases, dataset.common_target(runs))
     files.write_table(table[list(COLUMNS)], verdict)
-    files.write_table(at_a_glance(table, facts, params["cases"], files.read_table(designs)), glance)
+    files.write_table(at_a_glance(table, facts, params["cases"], files.read_table(designs, "rank")), glance)
 
 
 def found_design(kind: str, path: str | os.PathLike, factors: Iterable[str]) -> dict[str, float]:
@@ -52,9 +52,9 @@ def found_design(kind: str, path: str | os.PathLike, factors: Iterable[str]) -> 
     kind: selected (path: selected.yaml), best_f or best_i (front.csv), plan_best (designs.csv).
     """
     if kind == "selected":
-        return files.read_yaml(path)["design"]
-    table = files.read_table(path)
+        return files.read_yaml(path, "design")["design"]
     by = {"best_f": "J_fine", "best_i": "J_intermediate", PLAN_BEST: "rank"}[kind]
+    table = files.read_table(path, by, *factors)
     return {name: float(table.loc[table[by].idxmin(), name]) for name in factors}
 
 

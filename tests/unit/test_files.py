@@ -94,6 +94,31 @@ def test_damaged_netcdf_is_named_with_what_to_do(tmp_path, damage):
     assert said.startswith(f"{path}: is damaged") and "delete it, and snakemake makes it anew" in said
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("front.csv", b""),
+        ("front.csv", b"J_fine\n"),  # a heading alone
+        ("front.csv", b"theta_deg,J_intermediate\n55,0.1\n"),
+        ("front.csv", b"J_fine\n0.1,0.2\n0.1,0.2,0.3\n"),
+        ("front.csv", b"J_fine\n\xff\xfe\n"),
+        ("selected.yaml", b""),
+        ("selected.yaml", b"design"),
+        ("selected.yaml", b"rule: knee\n"),
+        ("selected.yaml", b"design: {theta_deg: 55,"),
+        ("selected.yaml", b"design: \xff\n"),
+    ],
+)
+def test_damaged_table_or_yaml_is_named_with_what_to_do(tmp_path, name, text):
+    path = tmp_path / name
+    path.write_bytes(text)
+    with pytest.raises(files.InputError) as refused:
+        files.read_table(path, "J_fine") if name == "front.csv" else files.read_yaml(path, "design")
+    said = str(refused.value)
+    assert said.startswith(f"{path}: is damaged") and said.isprintable()
+    assert "delete it, and snakemake makes it anew" in said
+
+
 def test_place_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     for path, place in (
