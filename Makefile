@@ -1,7 +1,7 @@
 # make                     the locked environment in .venv, then the full study
 # make resume              the same after an interruption: simulations go on from their last checkpoints
 # make STUDY=my-hopper     the study in another directory, with a config.yaml of its own; also with resume
-# make setup               the environment alone
+# make setup               the environment alone; make cluster: and Snakemake's plugin for Slurm
 # make test, make lint     in the same environment: the tests; style and the boundaries between modules
 # make test-all            the tests with the full counts: hours
 # make validation         the solver against closed forms and other codes: rewrites docs/validation.md; CASE=name for one
@@ -23,7 +23,10 @@ if ! .venv/bin/python -c 'import sys; from hopperopt import locks; sys.exit(not 
 	echo "another make is at work on this study ($(STUDY)): wait for its end, or stop it first" >&2; exit 1; fi
 endef
 
-.PHONY: study resume setup test test-all lint validation lock
+# Tests of one file share what they set up, so a process takes whole files.
+pytest = .venv/bin/python -m pytest --numprocesses logical --maxprocesses 8 --dist loadfile
+
+.PHONY: study resume setup cluster test test-all lint validation lock
 study: setup
 	$(lock_study); exec $(snakemake) --cores $(CORES)
 
@@ -32,11 +35,17 @@ resume: setup
 
 setup: $(stamp)
 
+cluster: .venv/cluster
+
+.venv/cluster: requirements-cluster.lock $(stamp)
+	$(install) --require-hashes -r requirements-cluster.lock
+	touch $@
+
 test: setup
-	.venv/bin/python -m pytest
+	$(pytest)
 
 test-all: setup
-	.venv/bin/python -m pytest -m "full or not full"
+	$(pytest) -m "full or not full"
 
 validation: setup
 	.venv/bin/python -m validation $(CASE)
@@ -73,6 +82,8 @@ $(stamp): requirements.lock pyproject.toml
 lock:
 	set -e; new=$$(mktemp -d); trap 'rm -rf "$$new"' EXIT; cp pyproject.toml "$$new"; \
 	$(PYTHON) -m venv "$$new/venv"; "$$new/venv/bin/pip" install --quiet uv; \
+	export="$$new/venv/bin/uv export --quiet --project $$new --no-header --no-emit-project"; \
 	echo "# Every library in one version for CPython 3.11 to 3.14, with the hashes of its files. Made by: make lock" > "$$new/lock"; \
-	"$$new/venv/bin/uv" export --quiet --project "$$new" --no-header --no-emit-project --all-extras --all-groups >> "$$new/lock"; \
-	cp "$$new/lock" requirements.lock
+	echo "# Snakemake's plugin for Slurm and what it needs, in the versions of requirements.lock. Made by: make lock" > "$$new/cluster"; \
+	$$export --all-extras --group build >> "$$new/lock"; $$export --only-group cluster >> "$$new/cluster"; \
+	cp "$$new/lock" requirements.lock; cp "$$new/cluster" requirements-cluster.lock

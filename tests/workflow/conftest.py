@@ -1,5 +1,6 @@
 """A tiny study, run once; its copies are changed in one thing and asked what would run again."""
 
+import fcntl
 import os
 import re
 import shutil
@@ -141,12 +142,21 @@ def new_study():
 
 
 @pytest.fixture(scope="session")
-def finished(tmp_path_factory, new_study):
-    """The tiny study after its one run; not to be changed."""
-    study = new_study(tmp_path_factory.mktemp("study"), CONFIG, plan=PLAN)
-    answer = study.snakemake()
-    assert answer.returncode == 0, answer.stdout
-    return study
+def finished(tmp_path_factory, worker_id, new_study):
+    """The tiny study after its one run, which parallel processes of pytest share; not to be changed."""
+    shared = tmp_path_factory.getbasetemp()
+    if worker_id != "master":
+        shared = shared.parent
+    with (shared / "study.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if (shared / "study.complete").exists():
+            return Study(shared / "study")
+        shutil.rmtree(shared / "study", ignore_errors=True)
+        study = new_study(shared / "study", CONFIG, plan=PLAN)
+        answer = study.snakemake()
+        assert answer.returncode == 0, answer.stdout
+        (shared / "study.complete").touch()
+        return study
 
 
 @pytest.fixture
