@@ -71,6 +71,7 @@ def _factors(count):
     )
 
 
+CASES = ("selected", "plan_best", "plan_centre", "bare")
 POINTS = st.lists(st.tuples(number(0, 20), number(0, 30)).map(list), min_size=2, max_size=6)
 SOUND = {
     "seed": whole(0, 2**62),
@@ -114,8 +115,18 @@ SOUND = {
         gravity_m_s2=number(1, 20),
         threads=whole(1, 8),
     ),
-    "surrogate": some(starts=whole(1, 100), selected_hidden_nodes=st.sampled_from([3, 7, "auto"])),
+    "surrogate": some(
+        model=st.sampled_from(["auto", "paper", "network", "ensemble", "gaussian"]),
+        starts=whole(1, 100),
+        selected_hidden_nodes=st.sampled_from([3, 7, "auto"]),
+        validation=some(starts=whole(1, 100)),
+    ),
     "optimise": some(population=whole(4, 200), generations=whole(1, 100)),
+    "verification": some(
+        replicates=whole(1, 100),
+        replicates_of=some(selected=whole(1, 100), bare=whole(1, 100)),
+        cases=some(paper=st.none(), best_f=st.sampled_from(["best_f", None]), again=st.sampled_from(CASES)),
+    ),
     "figures": some(dpi=whole(50, 600)),
 }
 PLANS = st.one_of(
