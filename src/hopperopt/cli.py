@@ -91,6 +91,7 @@ SIMULATION = "experiment"
 FIGURES = {
     "hopper": ("run",),
     "curves": ("dataset",),
+    "indices": ("dataset",),
     "fit": ("training", "network"),
     "verification": ("simulations*", "surrogate"),
     "verdict": ("verdict", "designs"),

@@ -11,14 +11,15 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from hopperopt import files, outflow, uncertainty
+from hopperopt import files, indices, outflow, uncertainty
 
 # What a run that did not end well cannot tell; its counts and monitors stay, to show what went wrong.
 RESULTS = ("discharge_time", "discharge_rate", "mass_flow_index")
 # What makes a netCDF file one of a run.
 RUN = {
-    "exit_time", "diameter", "size_class", "status", "filling_level", "filling_time", "residual_count",
-    "residual_mass_fraction", "max_overlap", "max_speed_ratio", "max_energy_gain", "lost_particles", *RESULTS,
+    "exit_time", "diameter", "size_class", "position_opening", "status", "filling_level", "filling_time",
+    "residual_count", "residual_mass_fraction", "max_overlap", "max_speed_ratio", "max_energy_gain",
+    "lost_particles", *RESULTS,
 }  # fmt: skip
 RANKING = outflow.SIZE_CLASSES[:2]  # whose objectives rank the designs
 NAMED = 30  # experiments in one sentence
@@ -169,14 +170,18 @@ def _data_point(run: xr.Dataset, target: np.ndarray, unusable: bool) -> xr.Datas
     )
     scalars.attrs = {}
     composition = outflow.outflow(run["exit_time"].values, run["diameter"].values, run["size_class"].values)
+    order = indices.residence_order(run["exit_time"].values, run["position_opening"].values)
     fraction, variance = composition if not unusable else np.full_like(composition, np.nan)
+    scalars[indices.ORDER] = order
     if unusable:
-        scalars = scalars.assign({name: scalars[name].where(False) for name in RESULTS})
+        scalars = scalars.assign({name: scalars[name].where(False) for name in (*RESULTS, indices.ORDER)})
+    of_sizes = indices.of_outflow(fraction, variance, target)
     return scalars.assign(
         mass_fraction=(("size_class", "M"), fraction),
         counting_variance=(("size_class", "M"), variance),
         J=("size_class", outflow.objective(fraction, target)),
         U=("size_class", outflow.corrected_square(fraction, target, variance)),
+        **{name: ("size_class", values) for name, values in of_sizes.items()},
     )
 
 
@@ -228,7 +233,7 @@ def _factor_attributes(name: str) -> dict[str, str]:
 
 def _described(dataset: xr.Dataset, unusable: Mapping) -> xr.Dataset:
     """Attach attributes to the variables made here and to the whole."""
-    names = {
+    names = indices.LONG_NAMES | {
         "mass_fraction": "mass fraction of the size class in the outflow",
         "counting_variance": "counting variance of the mass fraction in one run",
         "J": "raw objective, rms over M of the deviation from the batch",
@@ -252,7 +257,10 @@ def _described(dataset: xr.Dataset, unusable: Mapping) -> xr.Dataset:
 
 
 def table_of_runs(dataset: xr.Dataset) -> pd.DataFrame:
-    """One row per run: its factors, status, counts, times, monitors and raw objectives, for people."""
+    """One row per run: its factors, status, counts, times, monitors, raw objectives and indices, for people.
+
+    Squares without their noise are printed as sign(U) sqrt|U|, under the name of the objective.
+    """
     stacked = dataset.stack(run=("experiment", "replicate"), create_index=False)
     columns = ["experiment", "replicate", *_factors(dataset), "status"]
     scalars = [
@@ -261,8 +269,10 @@ def table_of_runs(dataset: xr.Dataset) -> pd.DataFrame:
     table = {name: stacked[name].values for name in [*columns, *scalars]}
     if "filling_level" in table:
         table["filling_level_mm"] = 1e3 * table.pop("filling_level")
-    for name in dataset["size_class"].values:
-        table[f"J_{name}"] = stacked["J"].sel(size_class=name).values
+    for name in ("J", *indices.OF_SIZES):
+        values = outflow.signed_root(stacked[name]) if name.startswith("U_") else stacked[name]
+        for size in dataset["size_class"].values:
+            table[f"{name.replace('U_', 'J_')}_{size}"] = values.sel(size_class=size).values
     return pd.DataFrame(table)
 
 

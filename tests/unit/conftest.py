@@ -40,6 +40,7 @@ def make_run():
                 "exit_time": ("particle", exit_time, {"units": "s"}),
                 "diameter": ("particle", np.array([2e-3, 3e-3, 4e-3])[size_class], {"units": "m"}),
                 "size_class": ("particle", size_class),
+                "position_opening": (("particle", "xyz"), rng.random((3 * count, 3)), {"units": "m"}),
                 **{name: ((), value, {"units": units.get(name, "1")}) for name, value in values.items()},
                 "status": ((), status),
             },

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hopperopt import dataset, design, files
+from hopperopt import dataset, design, files, indices
 
 PLAN = pd.DataFrame(
     {
@@ -76,6 +76,15 @@ def test_runs_stand_at_their_experiment_and_replicate(study):
     assert not (data["J"] ** 2 < data["U"]).any()
 
 
+def test_the_table_of_runs_has_the_indices_of_each_run(study):
+    data, table = gather(study), files.read_table(study / "runs.csv").set_index(["experiment", "replicate"])
+    run, row = data.sel(experiment="exp_02", replicate=1), table.loc[("exp_02", 1)]
+    assert row["residence_order"] == pytest.approx(run["residence_order"].item())
+    assert row["lacey_index_fine"] == pytest.approx(run["lacey_index"].sel(size_class="fine").item())
+    U = run["U_by_mass"].sel(size_class="coarse").item()
+    assert np.sign(row["J_by_mass_coarse"]) * row["J_by_mass_coarse"] ** 2 == pytest.approx(U)
+
+
 def test_every_number_has_a_unit_and_a_name(study):
     data = gather(study)
     assert data.attrs["Conventions"].startswith("CF-")
@@ -100,7 +109,10 @@ def test_dropped_runs_are_nan_and_listed(study, make_run):
     spoil(study, make_run, "exp_02_rep_2.nc", status="jammed", stayed=150)
     data = gather(study, incomplete="drop")
     bad = data.sel(experiment="exp_02", replicate=2)
-    assert all(bad[name].isnull().all() for name in ("mass_fraction", "J", "U", "discharge_time"))
+    assert all(
+        bad[name].isnull().all()
+        for name in ("mass_fraction", "J", "U", "discharge_time", *indices.LONG_NAMES)
+    )
     assert bad["residual_count"] == 150 and bad["status"] == "jammed"
     assert int(data["J"].isnull().sum()) == 3
     assert "exp_02_rep_2" in data.attrs["dropped_runs"]

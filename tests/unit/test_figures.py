@@ -20,6 +20,7 @@ from hopperopt.figures import (
     fit,
     front,
     hopper,
+    indices,
     labels,
     spheres,
     style,
@@ -28,7 +29,7 @@ from hopperopt.figures import (
 )
 from hopperopt.surrogate import targets, validation
 
-FIGURES = (hopper, curves, fit, verification, verdict, front, errors)
+FIGURES = (hopper, curves, indices, fit, verification, verdict, front, errors)
 BATCH = np.array([8, 27, 64]) / 99
 FACTORS = {"theta_deg": (50.0, 60.0), "length_mm": (30.0, 50.0), "height_mm": (26.0, 34.0)}
 CASE = {
@@ -300,6 +301,19 @@ def test_errors_can_be_read_and_tell_the_surrogate_that_is_used():
         words = [text.get_text() for text, _ in written(figure) if text.get_fontweight() == "bold"]
         assert words == [errors.WORDS[chosen]]
         assert len(figure.axes[0].get_yticks()) == 10 - len(left_out)
+
+
+@pytest.mark.parametrize("plan", [{}, {"experiments": 1}, {"experiments": 7, "replicates": 3}])
+def test_indices_can_be_read(make_plan, plan):
+    check_texts(indices.draw(make_plan(**plan)))
+
+
+def test_indices_are_drawn_by_rank_and_as_means_of_runs(make_plan):
+    data = make_plan(6, 2, dropped=[("exp_02", 1)])
+    panel = indices.draw(data).axes[list(indices.PANELS).index("residence_order")]
+    order = dataset.ranked_designs(data)["experiment"].tolist()
+    mean = data["residence_order"].sel(experiment=order).mean("replicate")
+    np.testing.assert_allclose(panel.lines[0].get_xydata(), np.column_stack([np.arange(1, 7), mean]))
 
 
 def test_hopper_can_be_read(run):

@@ -26,7 +26,7 @@ def test_every_output_is_there(finished):
     results = finished.directory / "results"
     figures = [
         f"figures/{n}.{f}"
-        for n in ("hopper", "curves", "fit", "verification", "verdict", "front", "errors")
+        for n in ("hopper", "curves", "indices", "fit", "verification", "verdict", "front", "errors")
         for f in ("png", "pdf")
     ]
     assert [name for name in [*OUTPUTS.split(), *figures] if not (results / name).stat().st_size] == []
@@ -113,7 +113,7 @@ def test_the_graph_has_every_rule(finished):
         "verify_simulate",
         "verify",
     } <= rules
-    assert len([rule for rule in rules if rule.startswith("figure_")]) == 7
+    assert len([rule for rule in rules if rule.startswith("figure_")]) == 8
 
 
 def test_the_report_holds_tables_and_figures(finished, tmp_path):

@@ -38,6 +38,26 @@ rule figure_curves:
         "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
 
 
+rule figure_indices:
+    """Indices of segregation and of the flow, all designs by their rank."""
+    input:
+        dataset=result("dataset.nc"),
+    output:
+        png=report(result("figures/indices.png"), caption="../report/indices.rst", category="Figures"),
+        pdf=result("figures/indices.pdf"),
+    log:
+        log_of("figures/indices"),
+    params:
+        settings=figure("indices"),
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=5,
+    shell:
+        "python -m hopperopt figure indices --params {params.settings:q} --dataset {input.dataset:q} "
+        "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
+
+
 rule figure_fit:
     """Targets and network, all experiments."""
     input:
