@@ -48,6 +48,9 @@ STAGES = {
         ("dataset.nc", "runs.csv", "designs.csv"),
         "gather the plan's runs",
     ),
+    "effects": Stage(
+        "effects", "effects", ("dataset",), ("effects.csv", "anova.csv"), "effects of the plan's factors"
+    ),
     "filter": Stage(
         "surrogate.targets", "filter_targets", ("dataset",), ("training.nc",), "clip and split the targets"
     ),
@@ -92,6 +95,7 @@ FIGURES = {
     "hopper": ("run",),
     "curves": ("dataset",),
     "indices": ("dataset",),
+    "effects": ("effects",),
     "fit": ("training", "network"),
     "verification": ("simulations*", "surrogate"),
     "verdict": ("verdict", "designs"),

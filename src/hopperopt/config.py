@@ -556,6 +556,7 @@ STAGES = {
         "experiments": [experiment._asdict() for experiment in study.plan],
     },
     "gather": lambda study: {"factors": list(study.factors), "incomplete": study.discharge.incomplete},
+    "effects": lambda study: {"factors": list(study.factors)},
     "filter": lambda study: {
         "factors": list(study.factors),
         **study.surrogate.targets,

@@ -16,6 +16,7 @@ from matplotlib.text import Text
 from hopperopt import cli, dataset, outflow
 from hopperopt.figures import (
     curves,
+    effects,
     errors,
     fit,
     front,
@@ -29,7 +30,7 @@ from hopperopt.figures import (
 )
 from hopperopt.surrogate import targets, validation
 
-FIGURES = (hopper, curves, indices, fit, verification, verdict, front, errors)
+FIGURES = (hopper, curves, indices, effects, fit, verification, verdict, front, errors)
 BATCH = np.array([8, 27, 64]) / 99
 FACTORS = {"theta_deg": (50.0, 60.0), "length_mm": (30.0, 50.0), "height_mm": (26.0, 34.0)}
 CASE = {
@@ -314,6 +315,26 @@ def test_indices_are_drawn_by_rank_and_as_means_of_runs(make_plan):
     order = dataset.ranked_designs(data)["experiment"].tolist()
     mean = data["residence_order"].sel(experiment=order).mean("replicate")
     np.testing.assert_allclose(panel.lines[0].get_xydata(), np.column_stack([np.arange(1, 7), mean]))
+
+
+def table_of_effects(factors, shift=0.0):
+    rows = itertools.product(factors, range(5), style.OBJECTIVES)
+    table = pd.DataFrame(rows, columns=["factor", "level", "objective"])
+    table["J"] = 0.01 + 0.001 * table["level"] - shift
+    return table.assign(J_low=table["J"] - 0.003, J_high=table["J"] + 0.004)
+
+
+@pytest.mark.parametrize("factors", [["theta_deg"], [*FACTORS], [*FACTORS, "friction", "outlet_mm", "c"]])
+def test_effects_can_be_read(factors):
+    for shift in (0, 0.02):
+        figure = effects.draw(table_of_effects(factors, shift))
+        check_texts(figure)
+        shown = [panel for panel in figure.axes if panel.get_visible()]
+        assert len(shown) == 2 * len(factors)
+        for panel in shown:
+            low, high = panel.get_ylim()
+            band = panel.collections[0].get_paths()[0].vertices[:, 1]
+            assert low <= band.min() and band.max() <= high
 
 
 def test_hopper_can_be_read(run):

@@ -18,6 +18,7 @@ OUTPUTS = """
     verification/glance.csv simulations/exp_01_rep_1.nc verification/selected_rep_1.nc
     verification/plan_centre_rep_1.nc verification/bare_rep_1.nc
     logs/simulate/exp_01_rep_1.log logs/simulate/exp_01_rep_1.tsv
+    analysis/effects.csv analysis/anova.csv
     surrogate/validation/exp_01.nc surrogate/validation.csv surrogate/validation.nc surrogate/model.nc
 """
 
@@ -26,7 +27,17 @@ def test_every_output_is_there(finished):
     results = finished.directory / "results"
     figures = [
         f"figures/{n}.{f}"
-        for n in ("hopper", "curves", "indices", "fit", "verification", "verdict", "front", "errors")
+        for n in (
+            "hopper",
+            "curves",
+            "indices",
+            "effects",
+            "fit",
+            "verification",
+            "verdict",
+            "front",
+            "errors",
+        )
         for f in ("png", "pdf")
     ]
     assert [name for name in [*OUTPUTS.split(), *figures] if not (results / name).stat().st_size] == []
@@ -104,6 +115,7 @@ def test_the_graph_has_every_rule(finished):
         "design",
         "simulate",
         "gather",
+        "effects",
         "filter",
         "train",
         "validate_fold",
@@ -113,7 +125,7 @@ def test_the_graph_has_every_rule(finished):
         "verify_simulate",
         "verify",
     } <= rules
-    assert len([rule for rule in rules if rule.startswith("figure_")]) == 8
+    assert len([rule for rule in rules if rule.startswith("figure_")]) == 9
 
 
 def test_the_report_holds_tables_and_figures(finished, tmp_path):

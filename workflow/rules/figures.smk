@@ -58,6 +58,26 @@ rule figure_indices:
         "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
 
 
+rule figure_effects:
+    """Main effects of the factors on the objectives."""
+    input:
+        effects=result("analysis/effects.csv"),
+    output:
+        png=report(result("figures/effects.png"), caption="../report/effects.rst", category="Figures"),
+        pdf=result("figures/effects.pdf"),
+    log:
+        log_of("figures/effects"),
+    params:
+        settings=figure("effects"),
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=5,
+    shell:
+        "python -m hopperopt figure effects --params {params.settings:q} --effects {input.effects:q} "
+        "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
+
+
 rule figure_fit:
     """Targets and network, all experiments."""
     input:

@@ -1,0 +1,20 @@
+rule effects:
+    """Main effects of the factors on the objectives, and the analysis of their variance."""
+    input:
+        dataset=result("dataset.nc"),
+    output:
+        effects=report(
+            result("analysis/effects.csv"), caption="../report/effects_table.rst", category="Tables"
+        ),
+        anova=report(result("analysis/anova.csv"), caption="../report/anova.rst", category="Tables"),
+    log:
+        log_of("effects"),
+    params:
+        settings=stage("effects"),
+    threads: 1
+    resources:
+        mem_mb=500,
+        runtime=5,
+    shell:
+        "python -m hopperopt effects --params {params.settings:q} --dataset {input.dataset:q} "
+        "--output {output.effects:q} {output.anova:q} > {log:q} 2>&1"
