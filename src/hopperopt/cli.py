@@ -74,6 +74,13 @@ STAGES = {
         ("model.nc",),
         "choose the surrogate and fit it",
     ),
+    "sensitivity": Stage(
+        "sensitivity",
+        "sensitivity",
+        ("surrogate", "dataset"),
+        ("sobol.csv",),
+        "sensitivity of the surrogate to the factors",
+    ),
     "optimise": Stage(
         "optimise",
         "optimise",
@@ -101,6 +108,7 @@ FIGURES = {
     "verdict": ("verdict", "designs"),
     "front": ("front", "dataset", "verdict"),
     "errors": ("validation", "surrogate"),
+    "sensitivity": ("sobol",),
 }
 
 

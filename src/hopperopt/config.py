@@ -565,6 +565,10 @@ STAGES = {
     "validate_fold": lambda study: study.surrogate.networks | {"starts": study.surrogate.validation.starts},
     "validate": lambda study: study.surrogate.networks | {"starts": study.surrogate.validation.starts},
     "choose": lambda study: {"model": study.surrogate.model, **study.surrogate.networks},
+    "sensitivity": lambda study: {
+        "bounds": {name: list(plans.bounds(levels)) for name, levels in study.levels.items()},
+        "seed": study.surrogate.seed,
+    },
     "optimise": lambda study: {
         **study.optimise.model_dump(exclude={"explicit"}),
         "explicit": study.optimise.explicit if study.optimise.select == "explicit" else None,

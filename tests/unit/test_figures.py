@@ -23,6 +23,7 @@ from hopperopt.figures import (
     hopper,
     indices,
     labels,
+    sensitivity,
     spheres,
     style,
     verdict,
@@ -30,7 +31,7 @@ from hopperopt.figures import (
 )
 from hopperopt.surrogate import targets, validation
 
-FIGURES = (hopper, curves, indices, effects, fit, verification, verdict, front, errors)
+FIGURES = (hopper, curves, indices, effects, fit, verification, verdict, front, errors, sensitivity)
 BATCH = np.array([8, 27, 64]) / 99
 FACTORS = {"theta_deg": (50.0, 60.0), "length_mm": (30.0, 50.0), "height_mm": (26.0, 34.0)}
 CASE = {
@@ -335,6 +336,16 @@ def test_effects_can_be_read(factors):
             low, high = panel.get_ylim()
             band = panel.collections[0].get_paths()[0].vertices[:, 1]
             assert low <= band.min() and band.max() <= high
+
+
+@pytest.mark.parametrize("factors", [["theta_deg"], [*FACTORS], [*FACTORS, "friction", "outlet_mm", "c"]])
+def test_sensitivity_can_be_read(factors):
+    rows = list(itertools.product(sensitivity.TITLES, factors))
+    table = pd.DataFrame(rows, columns=["output", "factor"]).assign(first=0.2, total=0.6)
+    for half in (0.3, np.nan):
+        for kind in ("first", "total"):
+            table[f"{kind}_low"], table[f"{kind}_high"] = table[kind] - half, table[kind] + half
+        check_texts(sensitivity.draw(table))
 
 
 def test_hopper_can_be_read(run):

@@ -18,7 +18,7 @@ OUTPUTS = """
     verification/glance.csv simulations/exp_01_rep_1.nc verification/selected_rep_1.nc
     verification/plan_centre_rep_1.nc verification/bare_rep_1.nc
     logs/simulate/exp_01_rep_1.log logs/simulate/exp_01_rep_1.tsv
-    analysis/effects.csv analysis/anova.csv
+    analysis/effects.csv analysis/anova.csv analysis/sobol.csv
     surrogate/validation/exp_01.nc surrogate/validation.csv surrogate/validation.nc surrogate/model.nc
 """
 
@@ -37,6 +37,7 @@ def test_every_output_is_there(finished):
             "verdict",
             "front",
             "errors",
+            "sensitivity",
         )
         for f in ("png", "pdf")
     ]
@@ -121,11 +122,12 @@ def test_the_graph_has_every_rule(finished):
         "validate_fold",
         "validate",
         "choose",
+        "sensitivity",
         "optimise",
         "verify_simulate",
         "verify",
     } <= rules
-    assert len([rule for rule in rules if rule.startswith("figure_")]) == 9
+    assert len([rule for rule in rules if rule.startswith("figure_")]) == 10
 
 
 def test_the_report_holds_tables_and_figures(finished, tmp_path):

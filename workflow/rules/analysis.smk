@@ -18,3 +18,23 @@ rule effects:
     shell:
         "python -m hopperopt effects --params {params.settings:q} --dataset {input.dataset:q} "
         "--output {output.effects:q} {output.anova:q} > {log:q} 2>&1"
+
+
+rule sensitivity:
+    """Sobol' indices of the surrogate's objectives and of the discharge time."""
+    input:
+        surrogate=result("surrogate/model.nc"),
+        dataset=result("dataset.nc"),
+    output:
+        sobol=report(result("analysis/sobol.csv"), caption="../report/sobol.rst", category="Tables"),
+    log:
+        log_of("sensitivity"),
+    params:
+        settings=stage("sensitivity"),
+    threads: 1
+    resources:
+        mem_mb=1500,
+        runtime=10,
+    shell:
+        "python -m hopperopt sensitivity --params {params.settings:q} --surrogate {input.surrogate:q} "
+        "--dataset {input.dataset:q} --output {output.sobol:q} > {log:q} 2>&1"

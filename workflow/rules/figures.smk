@@ -164,6 +164,26 @@ rule figure_front:
         "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
 
 
+rule figure_sensitivity:
+    """Sobol' indices of the surrogate."""
+    input:
+        sobol=result("analysis/sobol.csv"),
+    output:
+        png=report(result("figures/sensitivity.png"), caption="../report/sensitivity.rst", category="Figures"),
+        pdf=result("figures/sensitivity.pdf"),
+    log:
+        log_of("figures/sensitivity"),
+    params:
+        settings=figure("sensitivity"),
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=5,
+    shell:
+        "python -m hopperopt figure sensitivity --params {params.settings:q} --sobol {input.sobol:q} "
+        "--output {output.png:q} {output.pdf:q} > {log:q} 2>&1"
+
+
 rule figure_errors:
     """The surrogates compared at experiments that they have not seen."""
     input:

@@ -37,6 +37,11 @@ class Predictor(NamedTuple):
         """Mass fractions m_k(M), (n, outputs, m), of designs (n, factors) in the factors' order and units."""
         return self.predict(designs)[0]
 
+    @property
+    def knows_its_error(self) -> bool:
+        """Whether draws differ: a single network has but one curve for a design."""
+        return not isinstance(self.model, Ensemble) or len(self.model.members) > 1
+
     def draws(self, designs: np.ndarray, number: int, rng: np.random.Generator) -> np.ndarray:
         """Curves that may be the true ones, joint over the designs: (number, n, outputs, m)."""
         return self.model.draws(designs, self.M, number, rng)
