@@ -581,6 +581,7 @@ STAGES = {
             for name, case in study.verification.cases.items()
         ],
         "incomplete": study.discharge.incomplete,
+        "seed": study.surrogate.seed,
     },
     "figures": lambda study: study.figures.model_dump(),
 }

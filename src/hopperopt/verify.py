@@ -15,6 +15,7 @@ from hopperopt.uncertainty import SIGMAS, Estimate
 from hopperopt.verdict import COLUMNS, NONE, Case, Prediction, judge
 
 PLAN_BEST = "plan_best"
+DRAWS = 1000  # of the surrogate, for the limits of what it predicts
 
 
 def verify(
@@ -22,7 +23,8 @@ def verify(
 ) -> None:
     """Write the verdict, numbers for a row per case and objective, and the same at a glance, in words.
 
-    params: `cases`, pairs of name and kind in order; `incomplete`, refuse or drop. simulations: the cases'
+    params: `cases`, pairs of name and kind in order; `incomplete`, refuse or drop; `seed`, of the surrogate's
+    draws. simulations: the cases'
     runs, named CASE_rep_REPLICATE.nc; surrogate: path of model.nc; designs: path of designs.csv. Raises
     files.InputError naming the runs that did not end well, unless they are to be dropped; a case without any
     run left has empty cells.
@@ -37,7 +39,7 @@ def verify(
         own = {key: run for key, run in runs.items() if key[0] == name}
         usable = [run for key, run in own.items() if key not in unusable]
         design = json.loads(next(iter(own.values())).attrs["case"])["design"]
-        cases.append(Case(name, kind, predict(predictor, design), curves(usable)))
+        cases.append(Case(name, kind, predict(predictor, design, params["seed"]), curves(usable)))
         times = [float(run["discharge_time"]) for run in usable]
         factors = {factor: design.get(factor, np.nan) for factor in predictor.factors}
         facts.append({**factors, "discharge_time_s": np.mean(times) if times else np.nan})
@@ -58,15 +60,22 @@ def found_design(kind: str, path: str | os.PathLike, factors: Iterable[str]) -> 
     return {name: float(table.loc[table[by].idxmin(), name]) for name in factors}
 
 
-def predict(predictor: prediction.Predictor, design: Mapping[str, float]) -> Prediction:
+def predict(predictor: prediction.Predictor, design: Mapping[str, float], seed: int) -> Prediction:
     """What the surrogate says of a design; NaN for the bare hopper.
 
-    Its error of J counts as a standard deviation, so that J squared has the variance 4 J^2 e^2 + 2 e^4; a
-    surrogate that does not know its error has no limits, and no variance.
+    Limits and variance are those of its draws there. A single network has none: its error of J counts as a
+    standard deviation e, the same everywhere, so that J squared has the variance 4 J^2 e^2 + 2 e^4; without a
+    known error there are no limits, and no variance.
     """
     if not design:
         return NONE
-    J = predictor.objectives(predictor.array(design))[0]
+    where = predictor.array(design)
+    J = predictor.objectives(where)[0]
+    if predictor.knows_its_error:
+        drawn = predictor.draws(where, DRAWS, np.random.default_rng(seed))[:, 0]
+        drawn = outflow.objective(drawn, predictor.batch)
+        low, high = np.quantile(drawn, [uncertainty.LEVEL, 1 - uncertainty.LEVEL], axis=0)
+        return Prediction(J, low, high, Estimate(J**2, np.var(drawn**2, axis=0)))
     error = np.full_like(J, np.nan) if predictor.objective_error is None else predictor.objective_error
     variance = np.nan_to_num(4 * J**2 * error**2 + 2 * error**4)
     return Prediction(J, np.maximum(J - SIGMAS * error, 0), J + SIGMAS * error, Estimate(J**2, variance))

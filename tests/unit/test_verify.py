@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from hopperopt import files, outflow, verify
-from hopperopt.surrogate import prediction
+from hopperopt.surrogate import gaussian, prediction
 from hopperopt.surrogate.network import Ensemble, Network, Scaling
 from hopperopt.verdict import COLUMNS
 
@@ -15,6 +15,7 @@ CENTRE = {"theta_deg": 55.0, "length_mm": 40.0}
 PARAMS = {
     "cases": [["selected", "selected"], ["plan_best", "plan_best"], ["bare", "bare"]],
     "incomplete": "refuse",
+    "seed": 1,
 }
 DESIGNS = pd.DataFrame(
     {
@@ -98,6 +99,33 @@ def test_z_counts_the_errors_of_both(study):
     assert both.loc["selected", "predicted_high"].tolist() == pytest.approx(
         [0.01 + 1.645 * 0.02, 0.02 + 1.645 * 0.04], rel=1e-3
     )
+
+
+def test_members_that_differ_are_the_error_of_a_prediction(study):
+    """Two networks, one with the batch's fractions 0.01 and 0.02 above, one with three times that."""
+    one = prediction.load(study / "network.nc")
+    member = one.model.members[0]
+    other = member._replace(output=3 * member.output)
+    said = verify.predict(one._replace(model=Ensemble((member, other))), CENTRE, 1)
+    np.testing.assert_allclose(said.low, [0.01, 0.02])
+    np.testing.assert_allclose(said.high, [0.03, 0.06])
+    np.testing.assert_allclose(said.J**2, [5e-4, 20e-4])
+    np.testing.assert_allclose(said.squared.variance, [16e-8, 16 * 16e-8], rtol=0.02)
+    alone = verify.predict(one._replace(objective_error=np.array([0.001, 0.002])), CENTRE, 1)
+    np.testing.assert_allclose(alone.high - alone.low, 2 * 1.645 * np.array([0.001, 0.002]), rtol=1e-3)
+
+
+def test_limits_of_the_processes_hold_nine_of_ten_true_objectives(synthetic):
+    """Wider away from the plan's designs than on them, and right for both in the mean."""
+    model = gaussian.fit(synthetic.training(3))
+    predictor = prediction.Predictor(tuple(synthetic.factors), outflow.GRID, synthetic.batch, model)
+    designs = synthetic.anywhere(40, np.random.default_rng(1))
+    truth = outflow.objective(synthetic.curves(designs), synthetic.batch)
+    said = [verify.predict(predictor, dict(zip(synthetic.factors, row, strict=True)), 1) for row in designs]
+    low, high = (np.array([getattr(one, end) for one in said]) for end in ("low", "high"))
+    assert 0.8 <= np.mean((low <= truth) & (truth <= high)) <= 0.98
+    z = (truth**2 - [one.J**2 for one in said]) / np.sqrt([one.squared.variance for one in said])
+    assert abs(z.mean()) < 0.4 and 0.6 < z.std() < 1.3
 
 
 def test_more_runs_know_more(study, make_run):

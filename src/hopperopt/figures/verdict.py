@@ -52,7 +52,7 @@ def draw(verdict: pd.DataFrame, designs: pd.DataFrame) -> Figure:
         panel.set(ylim=(len(cases) - 0.5, -0.5), xlabel=style.OBJECTIVES[name])
         panel.set_yticks(range(len(cases)), [case.replace("_", " ") for case in cases])
         panel.tick_params(axis="y", length=0, labelleft=name == features.OUTPUTS[0])
-        panel.locator_params(axis="x", nbins=6)
+        panel.locator_params(axis="x", nbins=4)
         panel.annotate("against bare", (1, 1), (3, 3), xycoords="axes fraction", textcoords="offset points")
     marks = {"simulated": SIMULATED, "predicted": PREDICTED}
     marks |= {"the same design in the plan": IN_PLAN} if "plan_best" in cases else {}
