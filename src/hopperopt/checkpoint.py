@@ -71,16 +71,24 @@ def unpacked(data: bytes, stamp: Mapping[str, str]) -> dict[str, np.ndarray]:
     return state
 
 
+def place(output: Path, state_dir: Path) -> str:
+    """An output's place as seen from the state directory, so that a study may be moved."""
+    return os.path.relpath(output.resolve(), state_dir.resolve())
+
+
+def name_of(output: Path, state_dir: Path) -> str:
+    """Name, without a suffix, of the files in the state directory that belong to an output."""
+    return f"{output.stem}-{hashlib.sha256(place(output, state_dir).encode()).hexdigest()[:8]}"
+
+
 @contextmanager
 def working_on(output: Path, state_dir: Path, stamp: Mapping[str, str], minutes: float | None) -> Iterator:
     """Let no other process simulate `output`; give its checkpoint, and whether one had to wait.
 
     stamp: what the state follows from, as text by name. Without an exception the checkpoint is removed at the
-    end: the output is written. The file's name follows from the output's place as seen from the state
-    directory, so that a study may be moved.
+    end: the output is written.
     """
-    place = os.path.relpath(output.resolve(), state_dir.resolve())
-    name = f"{output.stem}-{hashlib.sha256(place.encode()).hexdigest()[:8]}"
+    name = name_of(output, state_dir)
     state, lock = state_dir / f"{name}.npz", state_dir / f"{name}.lock"
 
     def say(holder):

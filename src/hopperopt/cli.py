@@ -10,6 +10,7 @@ import importlib
 import json
 import logging
 import math
+import shutil
 import signal
 import sys
 import textwrap
@@ -160,6 +161,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"hopperopt {provenance.version()}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_simulate(commands.add_parser("simulate", help="run one simulation"))
+    _add_status(commands.add_parser("status", help="show how far a study is"))
     for name, stage in STAGES.items():
         _add_stage(commands.add_parser(name, help=stage.help), stage)
     figure = commands.add_parser("figure", help="draw one figure")
@@ -220,8 +222,7 @@ def _run_stage(given: argparse.Namespace) -> None:
         getattr(module, given.stage.function)(given.params, *inputs, *outputs)
 
 
-def _add_simulate(command: argparse.ArgumentParser) -> None:
-    command.description = "Run one simulation of a design, or of the bare hopper, as the configuration says."
+def _add_configfile(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--configfile",
         nargs="+",
@@ -230,6 +231,11 @@ def _add_simulate(command: argparse.ArgumentParser) -> None:
         metavar="YAML",
         help="the study; later files override earlier ones (default: config.yaml)",
     )
+
+
+def _add_simulate(command: argparse.ArgumentParser) -> None:
+    command.description = "Run one simulation of a design, or of the bare hopper, as the configuration says."
+    _add_configfile(command)
     for option, name in SHORTHANDS.items():
         command.add_argument(f"--{option}", metavar="VALUE", help=f"short for --factor {name}=VALUE")
     command.add_argument(
@@ -258,6 +264,39 @@ def _add_simulate(command: argparse.ArgumentParser) -> None:
     command.add_argument("--design", nargs="*", default=[], metavar="FILE", help=argparse.SUPPRESS)
     command.add_argument("--output", type=Path, required=True, metavar="FILE", help="netCDF file to write")
     command.set_defaults(action=_simulate)
+
+
+def _add_status(command: argparse.ArgumentParser) -> None:
+    command.description = (
+        "Show what a study has done, what runs and what is to come; from any terminal that sees its folder."
+    )
+    _add_configfile(command)
+    command.add_argument(
+        "--directory", type=Path, default=Path(), metavar="DIR", help="the study's folder (default: this one)"
+    )
+    command.add_argument("--watch", action="store_true", help="every two seconds, until all is done")
+    command.set_defaults(action=_status)
+
+
+def _status(given: argparse.Namespace) -> None:
+    """Show how far a study is, once or until all is done."""
+    from hopperopt import config, status
+
+    study = config.parse(config.load(given.directory / path for path in given.configfile), given.directory)
+    results, state_dir = (given.directory / folder for folder in (study.results_dir, study.state_dir))
+    runs = [run._replace(file=given.directory / run.file) for run in status.planned(study)]
+    figures = [results / f"figures/{name}.{suffix}" for name in FIGURES for suffix in ("png", "pdf")]
+
+    def draw():
+        seen = status.look(runs, state_dir)
+        lines = shutil.get_terminal_size().lines
+        return status.screen(runs, seen, results, figures, lines), status.ended(seen, results, figures)
+
+    if not given.watch:
+        sys.stdout.write(draw()[0])
+        return
+    with suppress(KeyboardInterrupt):
+        status.watch(draw, sys.stdout)
 
 
 def _simulate(given: argparse.Namespace) -> None:

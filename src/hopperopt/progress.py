@@ -47,14 +47,15 @@ class Reporter:
 
 def line(report) -> str:
     """One line: stage, simulated time, particles left, speed, time to go."""
-    to_go = "" if report.remaining is None else f", {_duration(report.remaining)} to go"
+    to_go = "" if report.remaining is None else f", {duration(report.remaining)} to go"
     return (
         f"{report.stage:9} {report.time:7.3f} s simulated, {report.particles:6d} particles left, "
         f"{report.rate / 1e6:5.1f} million particle-steps/s{to_go}"
     )
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """A time in words, to the second or, from an hour on, to the minute."""
     minutes, seconds = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return (

@@ -1,14 +1,14 @@
-"""One simulation as a job: its lock and checkpoint, its progress, its file."""
+"""One simulation as a job: its lock, checkpoint and heartbeat, its progress, its file."""
 
 import hashlib
 import json
 import logging
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import metadata
 from pathlib import Path
 
-from hopperopt import checkpoint, dataset, files, provenance
+from hopperopt import checkpoint, dataset, files, heartbeat, provenance
 from hopperopt.progress import Reporter
 
 
@@ -38,7 +38,8 @@ def simulate(
     with checkpoint.working_on(output, state_dir, stamp, checkpoint_minutes) as (kept, waited):
         run = _finished(output, origin) if waited else None
         if run is None:
-            run = _run(case, threads, kept)
+            with heartbeat.beating(output, state_dir, sum(case["particles"]["counts"])) as beat:
+                run = _run(case, threads, kept, beat)
             run.attrs |= provenance.attributes() | origin
             files.write_netcdf(run, output)
     level, reached = 1e3 * case["filling"]["level"], 1e3 * float(run["filling_level"])
@@ -60,9 +61,14 @@ def _finished(output: Path, origin: Mapping):
     return run
 
 
-def _run(case: Mapping, threads: int, kept: checkpoint.Checkpoint):
+def _run(case: Mapping, threads: int, kept: checkpoint.Checkpoint, beat: Callable):
     provenance.compile_solver(threads)  # before numba is imported
     from hopperopt import experiment
 
-    with Reporter(sys.stderr) as progress:
+    with Reporter(sys.stderr) as show:
+
+        def progress(report):
+            show(report)
+            beat(report)
+
         return experiment.run(case, progress=progress, threads=threads, checkpoint=kept)

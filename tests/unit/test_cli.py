@@ -1,12 +1,14 @@
 """The command line: what it refuses and how it says so, and what a simulation by hand is."""
 
 import json
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
 
-from hopperopt import cli, experiment, files, provenance
+from hopperopt import cli, experiment, files, heartbeat, provenance
 
 
 @pytest.fixture
@@ -17,6 +19,8 @@ def simulated(monkeypatch, tmp_path, make_run):
     def run(case, progress=None, threads=1, checkpoint=None):
         cases.append(case)
         used.append(threads)
+        progress(SimpleNamespace(stage="filling", time=0.1, particles=60, rate=1e6, remaining=None))
+        simulate.beats += heartbeat.read(Path("results/.state"))
         if stop := simulate.stops.pop() if simulate.stops else None:
             checkpoint.save({"counters": np.arange(3)})
             raise stop
@@ -32,7 +36,7 @@ def simulated(monkeypatch, tmp_path, make_run):
         assert cli.main(["simulate", *options, "--output", "out/run.nc"]) == 0
         return cases[-1], files.read_netcdf(tmp_path / "out" / "run.nc")
 
-    simulate.threads, simulate.stops, simulate.found = used, [], []
+    simulate.threads, simulate.stops, simulate.found, simulate.beats = used, [], [], []
     return simulate
 
 
@@ -53,6 +57,13 @@ def test_an_interrupted_simulation_leaves_its_state_to_the_next(simulated, tmp_p
     with pytest.raises(SystemExit):
         simulated("--checkpoint-minutes", "0")
     assert "0 is not allowed; allowed: a number above 0 or null" in capsys.readouterr().err
+
+
+def test_a_simulation_has_a_heartbeat_and_a_log_while_it_runs(simulated, capsys):
+    simulated()
+    assert [beat.output for beat in simulated.beats] == ["../../out/run.nc"]
+    assert "filling     0.100 s simulated,     60 particles left" in capsys.readouterr().err
+    assert not Path("results/.state").exists()
 
 
 def test_the_log_begins_with_versions_and_the_resolved_case(simulated, caplog):
