@@ -13,6 +13,7 @@ SCATTERS = 5  # standard deviations of the speed that the fastest particle has u
 def simulation(setup, labels, seed):
     """Case of a setup (its models in mm and degrees); `labels` are the design's factor values as typed."""
     insert, spheres = setup.insert_profile, setup.particles
+    interval = setup.simulation.snapshot_interval_s
     return {
         "walls": {
             # The rim is a length of wall of its own: contacts below it are what they are without it.
@@ -42,6 +43,8 @@ def simulation(setup, labels, seed):
         "gravity": setup.simulation.gravity_m_s2,
         "seed": seed,
         "design": {name: float(value) for name, value in labels.items()},
+        # A case without snapshots does not tell of them: it is the one that it was before there were any.
+        **({} if interval is None else {"snapshot_interval": interval}),
     }
 
 

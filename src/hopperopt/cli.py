@@ -10,7 +10,6 @@ import importlib
 import json
 import logging
 import math
-import shutil
 import signal
 import sys
 import textwrap
@@ -21,7 +20,7 @@ from typing import NamedTuple
 
 import yaml
 
-from hopperopt import provenance
+from hopperopt import commands, provenance
 from hopperopt.document import ConfigError, NotAllowed, lookup
 from hopperopt.quantity import Quantity
 
@@ -97,7 +96,7 @@ STAGES = {
         "judge the cases simulated anew",
     ),
 }
-SIMULATION = "experiment"
+SIMULATION, RECORDED = "experiment", "snapshots"  # modules that simulate, without and with snapshots
 # Options of each figure's inputs; a figure is drawn by the module `figures.NAME`.
 FIGURES = {
     "hopper": ("run",),
@@ -159,16 +158,16 @@ def _log_heading(settings: Mapping) -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="hopperopt", description=__doc__.splitlines()[0])
     parser.add_argument("--version", action="version", version=f"hopperopt {provenance.version()}")
-    commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    _add_simulate(commands.add_parser("simulate", help="run one simulation"))
-    _add_status(commands.add_parser("status", help="show how far a study is"))
+    stages = parser.add_subparsers(metavar="COMMAND", required=True)
+    _add_simulate(stages.add_parser("simulate", help="run one simulation"))
     for name, stage in STAGES.items():
-        _add_stage(commands.add_parser(name, help=stage.help), stage)
-    figure = commands.add_parser("figure", help="draw one figure")
+        _add_stage(stages.add_parser(name, help=stage.help), stage)
+    figure = stages.add_parser("figure", help="draw one figure")
     names = figure.add_subparsers(metavar="NAME", required=True)
     for name, inputs in FIGURES.items():
         stage = Stage(f"figures.{name}", "write", inputs, ("NAME.png", "NAME.pdf"), f"draw {name}")
         _add_stage(names.add_parser(name, help=stage.help), stage)
+    commands.add(stages, [f"figures/{name}.{suffix}" for name in FIGURES for suffix in ("png", "pdf")])
     return parser
 
 
@@ -222,20 +221,9 @@ def _run_stage(given: argparse.Namespace) -> None:
         getattr(module, given.stage.function)(given.params, *inputs, *outputs)
 
 
-def _add_configfile(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--configfile",
-        nargs="+",
-        type=Path,
-        default=[Path("config.yaml")],
-        metavar="YAML",
-        help="the study; later files override earlier ones (default: config.yaml)",
-    )
-
-
 def _add_simulate(command: argparse.ArgumentParser) -> None:
     command.description = "Run one simulation of a design, or of the bare hopper, as the configuration says."
-    _add_configfile(command)
+    commands.add_configfile(command)
     for option, name in SHORTHANDS.items():
         command.add_argument(f"--{option}", metavar="VALUE", help=f"short for --factor {name}=VALUE")
     command.add_argument(
@@ -266,39 +254,6 @@ def _add_simulate(command: argparse.ArgumentParser) -> None:
     command.set_defaults(action=_simulate)
 
 
-def _add_status(command: argparse.ArgumentParser) -> None:
-    command.description = (
-        "Show what a study has done, what runs and what is to come; from any terminal that sees its folder."
-    )
-    _add_configfile(command)
-    command.add_argument(
-        "--directory", type=Path, default=Path(), metavar="DIR", help="the study's folder (default: this one)"
-    )
-    command.add_argument("--watch", action="store_true", help="every two seconds, until all is done")
-    command.set_defaults(action=_status)
-
-
-def _status(given: argparse.Namespace) -> None:
-    """Show how far a study is, once or until all is done."""
-    from hopperopt import config, status
-
-    study = config.parse(config.load(given.directory / path for path in given.configfile), given.directory)
-    results, state_dir = (given.directory / folder for folder in (study.results_dir, study.state_dir))
-    runs = [run._replace(file=given.directory / run.file) for run in status.planned(study)]
-    figures = [results / f"figures/{name}.{suffix}" for name in FIGURES for suffix in ("png", "pdf")]
-
-    def draw():
-        seen = status.look(runs, state_dir)
-        lines = shutil.get_terminal_size().lines
-        return status.screen(runs, seen, results, figures, lines), status.ended(seen, results, figures)
-
-    if not given.watch:
-        sys.stdout.write(draw()[0])
-        return
-    with suppress(KeyboardInterrupt):
-        status.watch(draw, sys.stdout)
-
-
 def _simulate(given: argparse.Namespace) -> None:
     """Run one simulation and write its file."""
     case, running = _case(given)
@@ -309,7 +264,7 @@ def _simulate(given: argparse.Namespace) -> None:
 
     files.check_writable(given.output)  # before hours of work
     _log_heading(case)
-    digest = provenance.code_digest(f"hopperopt.{SIMULATION}")
+    digest = provenance.code_digest(f"hopperopt.{RECORDED if 'snapshot_interval' in case else SIMULATION}")
     from hopperopt.simulate import simulate
 
     simulate(case, digest, given.output, **running._replace(**chosen)._asdict())

@@ -228,12 +228,13 @@ class Discharge(Model):
 
 
 class Simulation(Model):
-    """Time step (`auto`: a fifth of the Rayleigh time), gravity; threads and checkpoints of one run."""
+    """Time step (`auto`: a fifth of the Rayleigh time), gravity; threads, checkpoints, snapshots of a run."""
 
     time_step_s: Annotated[float | Literal["auto"], Number(above=0)] = 4.0e-5
     gravity_m_s2: Annotated[float, Number(least=0.001, most=1000)] = 9.81
     threads: Annotated[int, Number(least=1, most=1024)] = 1
     checkpoint_minutes: Annotated[float | None, Number(above=0, most=100_000)] = 5.0
+    snapshot_interval_s: Annotated[float | None, Number(least=0.01, most=10_000)] = None
 
 
 class Setup(Model):
@@ -535,6 +536,8 @@ class Study(Setup):
         setup["discharge"].pop("incomplete")
         for unused in ("threads", "checkpoint_minutes"):
             setup["simulation"].pop(unused)
+        if setup["simulation"]["snapshot_interval_s"] is None:  # as in the case
+            setup["simulation"].pop("snapshot_interval_s")
         if setup["filling"]["particles"] is not None:
             setup["filling"].pop("bed_solid_fraction")
         keys = {name: factor.key for name, factor in self.factors.items()}

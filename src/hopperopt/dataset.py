@@ -21,6 +21,7 @@ RUN = {
     "residual_count", "residual_mass_fraction", "max_overlap", "max_speed_ratio", "max_energy_gain",
     "lost_particles", *RESULTS,
 }  # fmt: skip
+CONVENTIONS = "CF-1.11"
 RANKING = outflow.SIZE_CLASSES[:2]  # whose objectives rank the designs
 NAMED = 30  # experiments in one sentence
 # Unit of a factor by the end of its name.
@@ -79,7 +80,7 @@ def read_runs(paths: Iterable) -> dict[tuple[str, int], xr.Dataset]:
         run = files.read_netcdf(path)
         if missing := RUN - set(run.data_vars):
             raise files.InputError(f"{path}: is no run of a simulation: no {', '.join(sorted(missing))}")
-        runs[match[1], int(match[2])] = run
+        runs[match[1], int(match[2])] = run.drop_dims("time", errors="ignore")  # snapshots are large
     return runs
 
 
@@ -213,7 +214,9 @@ def replicates(dataset: xr.Dataset) -> uncertainty.Runs:
 def _coordinates(plan: pd.DataFrame, replicates: list[int], target: np.ndarray) -> dict:
     return {
         "experiment": ("experiment", list(map(str, plan.index)), {"long_name": "experiment"}),
-        "replicate": ("replicate", replicates, {"long_name": "replicate, a filling with its own seed"}),
+        "replicate": (
+            "replicate", replicates, {"long_name": "replicate, a filling with its own seed", "units": "1"}
+        ),
         "size_class": ("size_class", list(outflow.SIZE_CLASSES), {"long_name": "size class"}),
         "M": ("M", outflow.GRID, {"long_name": "discharged mass fraction", "units": "1"}),
         "target_fraction": (
@@ -249,7 +252,7 @@ def _described(dataset: xr.Dataset, unusable: Mapping) -> xr.Dataset:
         dataset[name].attrs = {"long_name": text, "units": "1"}
     dropped = [f"{name}_rep_{replicate}: {reason}" for (name, replicate), reason in unusable.items()]
     return dataset.assign_attrs(
-        Conventions="CF-1.11",
+        Conventions=CONVENTIONS,
         title="Outflow of the hopper in the experiments of the plan",
         source="discrete element simulations",
         dropped_runs="; ".join(dropped),
@@ -298,4 +301,5 @@ def ranked_designs(dataset: xr.Dataset) -> pd.DataFrame:
 
 
 def _factors(dataset: xr.Dataset) -> list[str]:
-    return [name for name, c in dataset.coords.items() if c.dims == ("experiment",) and name != "experiment"]
+    names = (str(name) for name, c in dataset.coords.items() if c.dims == ("experiment",))
+    return [name for name in names if name != "experiment"]

@@ -40,6 +40,7 @@ def simulate(
         if run is None:
             with heartbeat.beating(output, state_dir, sum(case["particles"]["counts"])) as beat:
                 run = _run(case, threads, kept, beat)
+            _describe(run)
             run.attrs |= provenance.attributes() | origin
             files.write_netcdf(run, output)
     level, reached = 1e3 * case["filling"]["level"], 1e3 * float(run["filling_level"])
@@ -61,9 +62,21 @@ def _finished(output: Path, origin: Mapping):
     return run
 
 
+def _describe(run) -> None:
+    """Attach what the CF conventions ask for beside the units and long names that a run has."""
+    run.attrs |= {
+        "Conventions": dataset.CONVENTIONS,
+        "title": "One discharge of the hopper",
+        "source": "discrete element simulation",
+    }
+    run["xyz"].attrs["long_name"] = "direction: x, y, or z upwards on the axis of the hopper"
+
+
 def _run(case: Mapping, threads: int, kept: checkpoint.Checkpoint, beat: Callable):
     provenance.compile_solver(threads)  # before numba is imported
-    from hopperopt import experiment
+    from hopperopt import experiment, snapshots
+
+    module = snapshots if "snapshot_interval" in case else experiment
 
     with Reporter(sys.stderr) as show:
 
@@ -71,4 +84,4 @@ def _run(case: Mapping, threads: int, kept: checkpoint.Checkpoint, beat: Callabl
             show(report)
             beat(report)
 
-        return experiment.run(case, progress=progress, threads=threads, checkpoint=kept)
+        return module.run(case, progress=progress, threads=threads, checkpoint=kept)

@@ -675,6 +675,18 @@ def test_case_and_derived_case_hold_nothing_of_other_sections(key, value):
     assert plain.derived_params("selected", 1) == changed.derived_params("selected", 1)
 
 
+def test_a_case_without_snapshots_does_not_tell_of_them():
+    """So that the runs of a study without them are what they were before there were any."""
+    plain, recorded = (config.parse({"simulation": {"snapshot_interval_s": s}}) for s in (None, "0.02"))
+    assert "snapshot" not in json.dumps(plain.simulation_case(CENTRE, "exp_13", 1))
+    assert "snapshot" not in json.dumps(plain.derived_params("selected", 1))
+    case = recorded.simulation_case(CENTRE, "exp_13", 1)
+    assert case.pop("snapshot_interval") == 0.02
+    assert case == plain.simulation_case(CENTRE, "exp_13", 1)
+    found = config.derived_case(recorded.derived_params("exp_13", 1), CENTRE)
+    assert found == case | {"snapshot_interval": 0.02}
+
+
 def test_derived_case_is_that_of_the_same_design():
     study = config.parse(with_paper({"insert": {"height_mm": 31}, "wall": {"shear_modulus_pa": ".inf"}}))
     params = json.loads(json.dumps(study.derived_params("selected", 2)))

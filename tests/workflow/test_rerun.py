@@ -144,6 +144,7 @@ OTHER = {
     "simulation.gravity_m_s2": 9.8,
     "simulation.threads": 2,
     "simulation.checkpoint_minutes": 7,
+    "simulation.snapshot_interval_s": 0.02,
     "design.replicates": 2,
     "design.lhs.experiments": 5,
     "design.lhs.seed": 2,
@@ -203,6 +204,15 @@ def test_every_key_has_another_value():
     elsewhere = {key for key in known if key.startswith(AT_THEIR_OWN)}
     assert known - elsewhere <= {*OTHER, "design.plan"}
     assert {row["simulate"] for row in map(row_of, OTHER)} == {"all", "rep_2", ""}
+
+
+@pytest.mark.full
+def test_the_code_of_snapshots_counts_where_they_are_taken(study):
+    override(study, "simulation.snapshot_interval_s", 0.1)
+    assert study.snakemake("--touch", "--forceall", "--configfile", "other.yaml").returncode == 0
+    assert study.planned("--configfile", "other.yaml") == set()
+    study.add_code("snapshots.py", EXTRA)
+    assert study.planned("--configfile", "other.yaml") == jobs(row_of("hopper"))
 
 
 @pytest.mark.full

@@ -29,6 +29,7 @@ DESIGNS = dict(STUDY.experiments())
 EXPERIMENTS = list(DESIGNS)
 REPLICATES = range(1, STUDY.design.replicates + 1)
 CASES = STUDY.cases()
+SIMULATION = cli.SIMULATION if STUDY.simulation.snapshot_interval_s is None else cli.RECORDED
 
 
 def result(path):
@@ -125,12 +126,12 @@ def found_design(wildcards):
 
 def experiment_params(wildcards):
     """Parameters of a simulation of the plan."""
-    return as_json(experiment_case(wildcards), cli.SIMULATION)
+    return as_json(experiment_case(wildcards), SIMULATION)
 
 
 def verification_params(wildcards):
     """Parameters of a simulation of the verification."""
-    return as_json(verification_case(wildcards), cli.SIMULATION)
+    return as_json(verification_case(wildcards), SIMULATION)
 
 
 def running(wildcards, threads):
@@ -145,7 +146,12 @@ def simulation_resources():
     case = case_of(json.dumps(design), name, 1)
     particles = sum(case["particles"]["counts"])
     steps = (case["filling"]["settling_limit"] + 3.0) / case["time_step"]
-    return {"mem_mb": 1000 + particles // 500, "runtime": 10 + round(particles * steps / 2e6 / 60)}
+    interval = STUDY.simulation.snapshot_interval_s
+    snapshots = 0 if interval is None else particles * case["discharge"]["time_limit"] / interval
+    return {
+        "mem_mb": 1000 + particles // 500 + round(4e-5 * snapshots),
+        "runtime": 10 + round(particles * steps / 2e6 / 60),
+    }
 
 
 def plan_runs():

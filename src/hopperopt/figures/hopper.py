@@ -9,10 +9,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.patches import Circle, Polygon
 from matplotlib.ticker import MaxNLocator
 
-from hopperopt import files, outflow
+from hopperopt import files, moments, outflow
 from hopperopt.figures import spheres, style
 from hopperopt.geometry import is_solid
 
@@ -38,23 +39,24 @@ def draw(run: xr.Dataset) -> Figure:
     are in mm, particles at true scale.
     """
     case = json.loads(run.attrs["case"])
-    walls = {name: PER_M * np.array(w, float) for name, w in case["walls"].items() if w is not None}
-    moments = {
+    walls = walls_of(case)
+    rows = {
         "before the discharge": PER_M * run["position_opening"].values,
-        _half_way(run): PER_M * run["position_half"].values,
+        _words_for(moments.half_time(run)): PER_M * run["position_half"].values,
     }
     sensor = PER_M * case["discharge"]["sensor"]
-    limits = _limits(walls, PER_M * run["position_opening"].values, case)
+    limits = limits_of(run, case)
     frame = style.Frame(left=11, right=1, bottom=19, top=5)
     gaps = (3.0, 6.0)
     scale = (WIDTH - frame.left - frame.right - gaps[0]) / 2 / (limits[1] - limits[0])
     height = scale * (limits[3] - limits[2])
     figure = style.page(WIDTH, frame.bottom + 2 * height + gaps[1] + frame.top)
     axes = style.panels(figure, 2, 2, frame, gaps, sharex=True, sharey=True)
-    for row, (moment, position) in zip(axes, moments.items(), strict=True):
+    for row, (moment, position) in zip(axes, rows.items(), strict=True):
         for panel, side in zip(row, SIDES, strict=True):
-            _draw_walls(panel, walls)
-            _draw_particles(panel, run, position, side, limits, scale)
+            draw_walls(panel, walls)
+            resolution = scale * style.MM * style.IMAGE_DPI
+            draw_particles(panel, run, position, by_size(run), side, limits, resolution)
             panel.set_title(f"{side}, {moment}", loc="left")
     _finish_axes(axes, limits)
     for panel in axes[0]:
@@ -63,26 +65,25 @@ def draw(run: xr.Dataset) -> Figure:
         outlet = walls["gate"][:, 0].max()
         panel.plot([-outlet, outlet], [sensor, sensor], color=WALL, linewidth=0.7, linestyle=":", zorder=3)
     _draw_dimensions(axes[0, 0], walls, limits)
-    _draw_key(figure, case, scale)
+    draw_key(figure, case, scale)
     return figure
 
 
-def _half_way(run):
-    """Words for the moment at which half of the mass had left."""
-    if run["position_half"].isnull().all():
-        return "never half discharged"
-    order = np.argsort(run["exit_time"].values)
-    mass = np.cumsum(run["diameter"].values[order] ** 3)
-    # NaN, what never left, comes last.
-    moment = run["exit_time"].values[order][np.searchsorted(mass, 0.5 * mass[-1])]
-    return f"at $M$ = 0.5, after {moment:.2f} s"
+def _words_for(half):
+    return "never half discharged" if np.isnan(half) else f"at $M$ = 0.5, after {half:.2f} s"
 
 
-def _limits(walls, position, case):
+def walls_of(case: Mapping) -> dict[str, np.ndarray]:
+    """Profiles r, z (mm) of the walls of a case, by name."""
+    return {name: PER_M * np.array(w, float) for name, w in case["walls"].items() if w is not None}
+
+
+def limits_of(run: xr.Dataset, case: Mapping) -> tuple[float, float, float, float]:
     """Left, right, bottom and top (mm) of what is shown: particles, insert, and the way to the sensor.
 
     A filling that blew up has left no positions: then it is the height that the bed should have had.
     """
+    walls, position = walls_of(case), PER_M * run["position_opening"].values
     widest = walls["hopper"][:, 0].max() + MARGIN
     heights = position[np.isfinite(position).all(axis=1), 2]
     # A few may still hop on the bed, or fly away.
@@ -99,7 +100,7 @@ def _mirrored(profile):
     return np.concatenate([-r[::-1], r]), np.concatenate([z[::-1], z])
 
 
-def _draw_walls(axes: Axes, walls: Mapping) -> None:
+def draw_walls(axes: Axes, walls: Mapping) -> None:
     """Draw where the cut meets hopper and insert."""
     axes.add_patch(
         Polygon(np.column_stack(_mirrored(walls["hopper"])), facecolor=INSIDE, edgecolor="none", zorder=0)
@@ -119,20 +120,29 @@ def _draw_walls(axes: Axes, walls: Mapping) -> None:
         axes.plot(*(profile * side).T, color=WALL, linewidth=1.0, zorder=4)
 
 
-def _draw_particles(axes: Axes, run, position, side, limits, scale) -> None:
+def by_size(run: xr.Dataset) -> np.ndarray:
+    """Colour (n, 3), RGB from 0 to 1, of each particle by its size class."""
+    return np.array([to_rgb(COLOURS[name]) for name in outflow.SIZE_CLASSES])[run["size_class"].values]
+
+
+def draw_particles(axes: Axes, run, position, colours, side, limits, resolution) -> AxesImage:
+    """Draw the particles behind the cut.
+
+    position (n, 3), mm; colours (n, 3); side: one of `SIDES`; limits: left, right, bottom, top (mm) of what
+    is shown; resolution: pixels per mm.
+    """
     order, sign, _ = SIDES[side]
     centre = position[:, order] * [1, 1, sign]
     # A particle that has left, or that blew up, has no finite position.
     shown = np.isfinite(centre).all(axis=1) & (centre[:, 2] >= 0)
-    colours = np.array([to_rgb(COLOURS[name]) for name in outflow.SIZE_CLASSES])
     image = spheres.render(
         centre[shown],
         PER_M * run["diameter"].values[shown] / 2,
-        colours[run["size_class"].values[shown]],
-        spheres.View(*limits, resolution=scale * style.MM * style.IMAGE_DPI),
+        colours[shown],
+        spheres.View(*limits, resolution=resolution),
         depth=limits[1],
     )
-    axes.imshow(image, extent=limits, zorder=2, aspect="auto")
+    return axes.imshow(image, extent=limits, zorder=2, aspect="auto")
 
 
 def _finish_axes(axes, limits):
@@ -175,7 +185,7 @@ def _dimension(axes, start, end, text, offset, align):
     )
 
 
-def _draw_key(figure: Figure, case: Mapping, scale: float) -> None:
+def draw_key(figure: Figure, case: Mapping, scale: float) -> None:
     """Draw one particle of each size at true scale with its name, and the design in words, at the bottom."""
     width, height = style.size(figure)
     axes = figure.add_axes((0, 0, 1, 10 / height), xlim=(0, width), ylim=(0, 10))

@@ -1,0 +1,121 @@
+"""Commands for people beside the workflow: how far a study is, pictures of a run."""
+
+import argparse
+import shutil
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+
+def add(commands, figures: Sequence[str]) -> None:
+    """Add the commands to the subparsers; figures: paths of all figures, below the folder of results."""
+    for function, name, text in (
+        (_add_status, "status", "show how far a study is"),
+        (_add_render, "render", "draw a simulation as a movie, stills, or files for ParaView"),
+    ):
+        command = commands.add_parser(name, help=text)
+        command.set_defaults(figures=figures)
+        function(command)
+
+
+def add_configfile(command: argparse.ArgumentParser) -> None:
+    """Add the option that names the study's configuration."""
+    command.add_argument(
+        "--configfile",
+        nargs="+",
+        type=Path,
+        default=[Path("config.yaml")],
+        metavar="YAML",
+        help="the study; later files override earlier ones (default: config.yaml)",
+    )
+
+
+def _add_study(command: argparse.ArgumentParser) -> None:
+    add_configfile(command)
+    command.set_defaults(configfile=None)
+    command.add_argument(
+        "--directory", type=Path, default=Path(), metavar="DIR", help="the study's folder (default: this one)"
+    )
+
+
+def _study(given: argparse.Namespace):
+    """The study in a folder, its raw document and the files of that, found as Snakemake finds them."""
+    from hopperopt import config
+
+    paths = given.configfile or [given.directory / "config.yaml"]
+    document = config.load(paths)
+    return config.parse(document, given.directory), document, paths
+
+
+def _add_status(command: argparse.ArgumentParser) -> None:
+    command.description = (
+        "Show what a study has done, what runs and what is to come; from any terminal that sees its folder."
+    )
+    _add_study(command)
+    command.add_argument("--watch", action="store_true", help="every two seconds, until all is done")
+    command.set_defaults(action=_status)
+
+
+def _status(given: argparse.Namespace) -> None:
+    """Show how far a study is, once or until all is done."""
+    from hopperopt import status
+
+    study, *_ = _study(given)
+    results, state_dir = (given.directory / folder for folder in (study.results_dir, study.state_dir))
+    runs = [run._replace(file=given.directory / run.file) for run in status.planned(study)]
+    figures = [results / path for path in given.figures]
+
+    def draw():
+        seen = status.look(runs, state_dir)
+        lines = shutil.get_terminal_size().lines
+        return status.screen(runs, seen, results, figures, lines), status.ended(seen, results, figures)
+
+    if not given.watch:
+        sys.stdout.write(draw()[0])
+        return
+    with suppress(KeyboardInterrupt):
+        status.watch(draw, sys.stdout)
+
+
+def _add_render(command: argparse.ArgumentParser) -> None:
+    command.description = (
+        "Draw a simulation: the hopper cut open, at two moments and, of its snapshots, as a movie."
+    )
+    command.add_argument("run", type=Path, metavar="RUN.nc", help="file of a simulation")
+    command.add_argument(
+        "--colour",
+        choices=("size", "speed", "height"),
+        default="size",
+        help="of the particles (default: size)",
+    )
+    command.add_argument(
+        "--format",
+        choices=("gif", "mp4"),
+        default="gif",
+        help="of the movie (default: gif; mp4 takes ffmpeg)",
+    )
+    command.add_argument(
+        "--vtk", action="store_true", help="write a series that ParaView opens (.pvd), and no pictures"
+    )
+    command.add_argument(
+        "--output",
+        type=Path,
+        metavar="STEM",
+        help="where to: STEM.gif, STEM_opening.png, ... (default: beside the run, by its name)",
+    )
+    command.set_defaults(action=_render)
+
+
+def _render(given: argparse.Namespace) -> None:
+    """Draw one simulation, and say what was written."""
+    stem = given.run.with_suffix("") if given.output is None else given.output
+    if given.vtk:
+        from hopperopt import vtk
+
+        written = [vtk.write(given.run, stem)]
+    else:
+        from hopperopt.figures import movie
+
+        written = movie.write(given.run, stem, given.colour, given.format)
+    print("\n".join(map(str, written)))
