@@ -5,6 +5,7 @@
 # make test, make lint     in the same environment: the tests; style and the boundaries between modules
 # make test-all            the tests with the full counts: hours
 # make validation         the solver against closed forms and other codes: rewrites docs/validation.md; CASE=name for one
+# make archive             configuration, lock, data, tables and figures of the study as one zip file
 # make lock                the newest versions of all libraries into requirements.lock
 # make PYTHON=python3.12   another Python for the environment;   make CORES=4   fewer cores for the study
 
@@ -26,7 +27,7 @@ endef
 # Tests of one file share what they set up, so a process takes whole files.
 pytest = .venv/bin/python -m pytest --numprocesses logical --maxprocesses 8 --dist loadfile
 
-.PHONY: study resume setup cluster test test-all lint validation lock
+.PHONY: study resume setup cluster test test-all lint validation archive lock
 study: setup
 	$(lock_study); exec $(snakemake) --cores $(CORES)
 
@@ -49,6 +50,9 @@ test-all: setup
 
 validation: setup
 	.venv/bin/python -m validation $(CASE)
+
+archive: setup
+	.venv/bin/python -m hopperopt archive --directory '$(STUDY)'
 
 lint: setup
 	.venv/bin/ruff check .

@@ -1,6 +1,7 @@
-"""Commands for people beside the workflow: how far a study is, pictures of a run."""
+"""Commands for people beside the workflow: how far a study is, its archive, pictures of a run."""
 
 import argparse
+import logging
 import shutil
 import sys
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ def add(commands, figures: Sequence[str]) -> None:
     for function, name, text in (
         (_add_status, "status", "show how far a study is"),
         (_add_render, "render", "draw a simulation as a movie, stills, or files for ParaView"),
+        (_add_archive, "archive", "put a study into one zip file"),
     ):
         command = commands.add_parser(name, help=text)
         command.set_defaults(figures=figures)
@@ -76,6 +78,29 @@ def _status(given: argparse.Namespace) -> None:
         return
     with suppress(KeyboardInterrupt):
         status.watch(draw, sys.stdout)
+
+
+def _add_archive(command: argparse.ArgumentParser) -> None:
+    command.description = (
+        "Put a study's configuration, data, tables and figures into one zip file beside its results."
+    )
+    _add_study(command)
+    command.set_defaults(action=_archive)
+
+
+def _archive(given: argparse.Namespace) -> None:
+    """Write a study's archive, and say what it does not hold."""
+    study, document, paths = _study(given)
+    from hopperopt import archive, status
+
+    results = given.directory / study.results_dir
+    paths += [path for name in archive.tables_of(document) if (path := given.directory / name).is_file()]
+    output = results.with_name(f"{results.resolve().name}.zip")
+    held = archive.write(results, given.directory, paths, output)
+    expected = [*status.TABLES, *status.RESULTS.values(), *given.figures, "report.html"]
+    if missing := [path for path in expected if f"{archive.RESULTS}/{path}" not in held]:
+        logging.warning(f"not in it, as they are not there: {', '.join(missing)}")
+    print(f"{output}: {len(held)} files, {output.stat().st_size / 1e6:.1f} MB")
 
 
 def _add_render(command: argparse.ArgumentParser) -> None:

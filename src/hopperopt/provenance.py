@@ -125,12 +125,14 @@ def _git(*arguments: str) -> str:
 def attributes() -> dict[str, str]:
     """Attributes that say by what, where and when a file was made."""
     versions = {"python": platform.python_version(), **{name: _version(name) for name in LIBRARIES}}
+    git, created = git_state(), datetime.now(UTC).isoformat(timespec="seconds")
     return {
         "hopperopt_version": version(),
-        "git": git_state(),
+        "git": git,
         "versions": json.dumps(versions),
         "host": f"{platform.node()} ({platform.system()} {platform.machine()}, {os.cpu_count()} cores)",
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "created": created,
+        "history": f"{created} made by hopperopt {version()} (git {git})",
     }
 
 
