@@ -56,6 +56,9 @@ archive: setup
 
 lint: setup
 	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
+	.venv/bin/snakefmt --check workflow Snakefile
+	.venv/bin/mypy
 	.venv/bin/lint-imports
 
 # A Python that is named and is not the environment's makes it anew; without a name the environment stays.

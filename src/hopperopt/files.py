@@ -85,7 +85,7 @@ def write_netcdf(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     The file is made in memory: then what goes wrong in writing it, such as a full disk, is an OSError that
     says so.
     """
-    encoding = {}
+    encoding: dict = {}
     for name, variable in dataset.variables.items():
         numeric = variable.dtype.kind in "fiub"
         encoding[name] = (

@@ -87,7 +87,8 @@ def search(predictor: prediction.Predictor, bounds: np.ndarray, params: Mapping)
         callback=record,
         return_least_infeasible=True,
     )
-    points = Front(*(np.atleast_2d(result.opt.get(name)) for name in ("X", "F")), result.opt.get("G")[:, 0])
+    found = [np.atleast_2d(result.opt.get(name)) for name in ("X", "F")]
+    points = Front._make([*found, result.opt.get("G")[:, 0]])
     order = np.argsort(points.objectives[:, 0], kind="stable")
     return Front(*(item[order] for item in points)), record.generations
 

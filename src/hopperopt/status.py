@@ -30,6 +30,7 @@ RESULTS = {
     "optimum": "optimum/selected.yaml",
     "verdict": "verification/verdict.csv",
 }
+TABLES = ("design.csv", "runs.csv", "designs.csv", "optimum/front.csv", "verification/glance.csv")
 # States of a run: lost has a heartbeat that stopped, other is the file of other settings.
 DONE, RUNNING, LOST, OTHER, WAITING = "done", "running", "lost", "other", "waiting"
 
@@ -81,17 +82,18 @@ def look(runs: Sequence[Run], state_dir: Path) -> Seen:
     beats = {Path(os.path.normpath(state_dir / beat.output)): beat for beat in heartbeat.read(state_dir)}
     states, finished = [], []
     for run in runs:
-        beat, file = beats.get(Path(os.path.normpath(run.file))), _finished(run.file)
+        path = Path(os.path.normpath(run.file))
+        beat, file = beats.get(path), _finished(run.file)
         if beat is not None and _is_alive(beat):
-            state = RUNNING
-        elif file is not None:
-            state = DONE if run.case in (None, file.case) else OTHER
+            states.append(RUNNING)
+        elif file is None:
+            states.append(WAITING if beat is None else LOST)
+        elif run.case not in (None, file.case):
+            states.append(OTHER)
         else:
-            state = WAITING if beat is None else LOST
-        states.append(state)
-        if state == DONE:
+            states.append(DONE)
             finished.append(file)
-            beats.pop(Path(os.path.normpath(run.file)), None)  # left by a process that was killed
+            beats.pop(path, None)  # left by a process that was killed
     return Seen(states, beats, finished)
 
 
@@ -133,10 +135,10 @@ def to_go(beat: Beat, finished: Sequence[Finished]) -> float | None:
 def left(seen: Seen) -> float | None:
     """Wall time (s) to the end of all simulations, as many at a time as now; None where it cannot be told."""
     alive = [beat for beat in seen.beats.values() if _is_alive(beat)]
-    known = [to_go(beat, seen.finished) for beat in alive]
+    known = [seconds for beat in alive if (seconds := to_go(beat, seen.finished)) is not None]
     count = Counter(seen.states)
     waiting = count[WAITING] + count[LOST] + count[OTHER]
-    if not alive or None in known or (waiting and not seen.finished):
+    if not alive or len(known) < len(alive) or (waiting and not seen.finished):
         return None
     each = np.mean([run.wall_time for run in seen.finished]) if waiting else 0.0
     return float(max(max(known), (sum(known) + waiting * each) / len(alive)))

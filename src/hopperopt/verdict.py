@@ -30,7 +30,7 @@ class Prediction(NamedTuple):
     squared: Estimate
 
 
-NONE = Prediction(*np.full((3, len(OUTPUTS)), np.nan), Estimate(*np.full((2, len(OUTPUTS)), np.nan)))
+NONE = Prediction._make([*np.full((3, len(OUTPUTS)), np.nan), Estimate(*np.full((2, len(OUTPUTS)), np.nan))])
 
 
 class Case(NamedTuple):
@@ -53,10 +53,9 @@ def judge(cases: Sequence[Case], target: np.ndarray) -> pd.DataFrame:
     runs = uncertainty.stacked([case.runs for case in cases])
     simulated = uncertainty.estimate(runs, target, uncertainty.pooled_variance(runs))
     simulated = Estimate(*(values[:, : len(OUTPUTS)] for values in simulated))
-    predicted = Prediction(
-        *(np.stack([getattr(case.predicted, name) for case in cases]) for name in Prediction._fields[:3]),
-        Estimate(*np.stack([case.predicted.squared for case in cases], axis=1)),
-    )
+    stacks = [np.stack([getattr(case.predicted, name) for case in cases]) for name in Prediction._fields[:3]]
+    squared = Estimate(*np.stack([case.predicted.squared for case in cases], axis=1))
+    predicted = Prediction._make([*stacks, squared])
     difference = simulated - _bare([case.kind for case in cases], simulated)
     primary = np.array([case.kind == PRIMARY for case in cases])
     better, worse = (_adjusted(p, primary) for p in (difference.p_below(), 1 - difference.p_below()))

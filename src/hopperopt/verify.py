@@ -96,14 +96,14 @@ def at_a_glance(table: pd.DataFrame, facts: list[dict], cases: list, designs: pd
     table: as `verdict.judge` makes it; facts: factors and discharge time of each case; designs: designs.csv.
     """
     kinds, best = dict(cases), designs.loc[designs["rank"].idxmin()]
-    facts = pd.DataFrame(facts, index=list(kinds))
+    fact = pd.DataFrame(facts, index=list(kinds))
     rows = []
     for _, row in table.iterrows():
         in_plan = [best[row["objective"] + end] for end in ("", "_low", "_high")]
         rows.append(
             {
                 "case": row["case"],
-                **facts.loc[row["case"]],
+                **fact.loc[row["case"]],
                 "objective": row["objective"],
                 "n": row["n"],
                 "J_simulated": _in_words(*row[["simulated", "low", "high"]]),

@@ -105,7 +105,9 @@ rule figure_verification:
         simulations=verification_runs(shown_case()),
         surrogate=result("surrogate/model.nc"),
     output:
-        png=report(result("figures/verification.png"), caption="../report/verification.rst", category="Figures"),
+        png=report(
+            result("figures/verification.png"), caption="../report/verification.rst", category="Figures"
+        ),
         pdf=result("figures/verification.pdf"),
     log:
         log_of("figures/verification"),

@@ -6,9 +6,7 @@ rule gather:
     output:
         dataset=result("dataset.nc"),
         runs=report(result("runs.csv"), caption="../report/runs.rst", category="Tables"),
-        designs=report(
-            result("designs.csv"), caption="../report/designs.rst", category="Tables"
-        ),
+        designs=report(result("designs.csv"), caption="../report/designs.rst", category="Tables"),
     log:
         log_of("gather"),
     params:

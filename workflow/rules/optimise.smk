@@ -3,9 +3,7 @@ rule optimise:
     input:
         surrogate=result("surrogate/model.nc"),
     output:
-        front=report(
-            result("optimum/front.csv"), caption="../report/front_table.rst", category="Tables"
-        ),
+        front=report(result("optimum/front.csv"), caption="../report/front_table.rst", category="Tables"),
         history=result("optimum/history.nc"),
         selected=result("optimum/selected.yaml"),
     log:

@@ -23,9 +23,7 @@ rule train:
         training=result("surrogate/training.nc"),
     output:
         network=result("surrogate/network.nc"),
-        errors=report(
-            result("surrogate/errors.csv"), caption="../report/errors_table.rst", category="Tables"
-        ),
+        errors=report(result("surrogate/errors.csv"), caption="../report/errors_table.rst", category="Tables"),
     log:
         log_of("train"),
     params:

@@ -29,9 +29,7 @@ rule verify:
         verdict=report(
             result("verification/verdict.csv"), caption="../report/verdict_table.rst", category="Tables"
         ),
-        glance=report(
-            result("verification/glance.csv"), caption="../report/glance.rst", category="Tables"
-        ),
+        glance=report(result("verification/glance.csv"), caption="../report/glance.rst", category="Tables"),
     log:
         log_of("verify"),
     params:

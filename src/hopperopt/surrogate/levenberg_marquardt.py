@@ -60,7 +60,7 @@ def fit(
 class _State(NamedTuple):
     """Networks still in training, the first axis the networks; names as in `_fit_batch`."""
 
-    index: np.ndarray
+    index: np.ndarray  # type: ignore[assignment]  # a tuple has a method of that name
     vector: np.ndarray
     error: np.ndarray
     matrix: np.ndarray

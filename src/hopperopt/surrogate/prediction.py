@@ -1,7 +1,7 @@
 """The trained surrogate as a file, and as a function of the design."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -68,7 +68,7 @@ class Predictor(NamedTuple):
 
 def save(path: str | os.PathLike, predictor: Predictor, additions: Mapping, attributes: Mapping) -> None:
     """Write a surrogate: the predictor, further variables (the clip's limits, the split) and attributes."""
-    variables = _gaussian if isinstance(predictor.model, Gaussian) else _networks
+    variables: Callable = _gaussian if isinstance(predictor.model, Gaussian) else _networks
     units = {"long_name": "mass fraction in the batch", "units": "1"}
     result = xr.Dataset(
         {

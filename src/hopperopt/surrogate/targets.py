@@ -59,7 +59,7 @@ def filter_targets(params: Mapping, dataset: str | os.PathLike, output: str | os
 
 
 def clip_limits(
-    targets: np.ndarray, training: np.ndarray, sigma: float | None
+    targets: np.ndarray, training: np.ndarray | bool, sigma: float | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Limits of the clip: mean -+ sigma standard deviations over the training points, per output.
 

@@ -91,7 +91,7 @@ def score(predicted: xr.Dataset, data: xr.Dataset) -> dict[str, dict[str, float]
     for name in predicted["surrogate"].values:
         one = predicted.sel(surrogate=name)
         squares = ((one["curve"] - one["target"]) ** 2).mean("experiment").mean("M").values
-        error = np.sqrt(((one["J"] - one["simulated_J"]) ** 2).mean("experiment")).values
+        error = np.sqrt(((one["J"] - one["simulated_J"]) ** 2).mean("experiment").values)
         rows[str(name)] = _row(squares, error) | {
             "coverage_90": float(one["within"].mean()),
             **{f"coverage_{k}_hits": hits for k, hits in zip("fi", _hits(one["U_within"]), strict=True)},
@@ -115,10 +115,10 @@ def noise_floor(data: xr.Dataset, rng: np.random.Generator) -> dict[str, float]:
         draws = np.broadcast_to(batch[:, None] + departure, (DRAWS, *curve.shape))
         drawn = simulations(draws, noise, runs, batch, rng)[1]
         deviations.append(drawn - np.mean(departure**2, axis=-1))
-    deviations, mean = np.array(deviations), U.mean(axis=0)  # (experiments, draws, outputs)
-    noisy = np.mean(deviations**2, axis=(0, 1)) / np.maximum(U.var(axis=0), np.finfo(float).tiny)
+    deviation, mean = np.array(deviations), U.mean(axis=0)  # (experiments, draws, outputs)
+    noisy = np.mean(deviation**2, axis=(0, 1)) / np.maximum(U.var(axis=0), np.finfo(float).tiny)
     true = np.maximum(mean + np.sqrt(np.maximum(1 - noisy, 0)) * (U - mean), 0)[:, None]
-    errors = signed_root(true + deviations) - np.sqrt(true)
+    errors = signed_root(true + deviation) - np.sqrt(true)
     return _row(variance.mean(axis=(0, 2)), np.sqrt(np.mean(errors**2, axis=(0, 1))))
 
 
@@ -128,8 +128,8 @@ def random_points(data: xr.Dataset, params: Mapping) -> dict[str, float]:
     The shares of points are those of the training set's split. It has no say on curves of new designs.
     """
     shape = data.sizes["experiment"], data.sizes["M"]
-    shares = (float((data["split"] == use).mean()) for use in (VALIDATION, TEST))
-    labels = split_points(shape, *shares, params["seed"])
+    stopping_share, test_share = (float((data["split"] == use).mean()) for use in (VALIDATION, TEST))
+    labels = split_points(shape, stopping_share, test_share, params["seed"])
     points = read_points(data.assign(split=(("experiment", "M"), labels)))
     size, _ = choose_size(points, params, data.attrs["clip_sigma"])
     trained, stopping, test = (points.use == use for use in (TRAINING, VALIDATION, TEST))
