@@ -80,7 +80,7 @@ def read_runs(paths: Iterable) -> dict[tuple[str, int], xr.Dataset]:
         run = files.read_netcdf(path)
         if missing := RUN - set(run.data_vars):
             raise files.InputError(f"{path}: is no run of a simulation: no {', '.join(sorted(missing))}")
-        runs[match[1], int(match[2])] = run.drop_dims("time", errors="ignore")  # snapshots are large
+        runs[match[1], int(match[2])] = run.drop_dims("snapshot", errors="ignore")  # snapshots are large
     return runs
 
 

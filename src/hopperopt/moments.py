@@ -31,9 +31,9 @@ def read(path: str | os.PathLike) -> xr.Dataset:
 
 def snapshots(run: xr.Dataset) -> list[Moment]:
     """The snapshots of a run, none where it was simulated without."""
-    if "time" not in run.dims:
+    if "snapshot" not in run.dims:
         return []
-    values = (run[name].values for name in ("time", "position", "speed"))
+    values = (run[name].values for name in ("snapshot_time", "position", "speed"))
     return [Moment(float(time), position, speed) for time, position, speed in zip(*values, strict=True)]
 
 

@@ -15,14 +15,15 @@ VARIABLES = {
     "position": _about("position, missing after the exit", "m"),
     "speed": _about("speed, missing after the exit", "m s-1"),
 }
-TIME = {"long_name": "time from the opening", "units": "s", "axis": "T"}
+TIME = _about("time of the snapshot from the opening", "s")
 
 
 def run(case, progress=None, threads=1, checkpoint=None):
     """Simulate one experiment as `experiment.run` does; the data set holds snapshots as well.
 
-    They are `position` (time, particle, xyz) and `speed` (time, particle), float32: at the opening, then at
-    the first look at the state from each multiple of the case's `snapshot_interval` (s), and at the end.
+    They are `position` (snapshot, particle, xyz) and `speed` (snapshot, particle), float32, at the times
+    `snapshot_time`: at the opening, then at the first look at the state from each multiple of the case's
+    `snapshot_interval` (s), and at the end.
     """
     return _Recorded(case, progress, threads, checkpoint).run()
 
@@ -60,10 +61,11 @@ class _Recorded(_Experiment):
 
     def dataset(self):
         values = {"position": self.snapshots[..., :3], "speed": self.snapshots[..., 3]}
-        dimensions = ("time", "particle", "xyz")
+        dimensions = ("snapshot", "particle", "xyz")
         variables = {
             name: (dimensions[: values[name].ndim], values[name], attributes)
             for name, attributes in VARIABLES.items()
         }
-        time = ("time", self.snapshot_times, TIME)
-        return super().dataset().assign(variables).assign_coords(time=time)
+        # To the CF conventions a coordinate `time` has a date as its origin.
+        time = ("snapshot", self.snapshot_times, TIME)
+        return super().dataset().assign(variables).assign_coords(snapshot_time=time)

@@ -30,7 +30,10 @@ RESULTS = {
     "optimum": "optimum/selected.yaml",
     "verdict": "verification/verdict.csv",
 }
-TABLES = ("design.csv", "runs.csv", "designs.csv", "optimum/front.csv", "verification/glance.csv")
+TABLES = (
+    "design.csv", "runs.csv", "designs.csv", "optimum/front.csv", "verification/glance.csv",
+    "analysis/effects.csv", "analysis/anova.csv", "analysis/sobol.csv",
+)  # fmt: skip
 # States of a run: lost has a heartbeat that stopped, other is the file of other settings.
 DONE, RUNNING, LOST, OTHER, WAITING = "done", "running", "lost", "other", "waiting"
 

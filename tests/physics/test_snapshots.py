@@ -29,12 +29,12 @@ def recorded(case):
 
 def test_all_else_is_the_same_to_the_bit(case, recorded):
     plain = experiment.run(case)
-    rest = recorded.drop_dims("time")
+    rest = recorded.drop_dims("snapshot")
     assert rest.drop_attrs(deep=False).identical(plain.drop_attrs(deep=False))
 
 
 def test_they_come_at_their_interval_from_the_opening_to_the_end(recorded):
-    time = recorded["time"].values
+    time = recorded["snapshot_time"].values
     assert time[0] == 0.0
     assert np.diff(time[:-1]) == pytest.approx(INTERVAL, abs=1e-9)
     assert time[-1] >= recorded["discharge_time"].item()
@@ -44,7 +44,7 @@ def test_they_come_at_their_interval_from_the_opening_to_the_end(recorded):
 
 
 def test_each_particle_is_there_until_its_exit(recorded):
-    outside = recorded["time"] >= recorded["exit_time"]
+    outside = recorded["snapshot_time"] >= recorded["exit_time"]
     np.testing.assert_array_equal(recorded["position"].isnull().all("xyz"), outside)
     np.testing.assert_array_equal(recorded["speed"].isnull(), outside)
 

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from PIL import Image
 
-from hopperopt import cli, files, moments
+from hopperopt import cli, dataset, files, moments
 from hopperopt.figures import hopper, movie
 
 CASE = {
@@ -47,8 +47,8 @@ def recorded(run):
     position = np.where(inside[..., None], run["position_opening"].values, np.nan)
     speed = np.where(inside, np.linspace(0, 2, 90, dtype=np.float32), np.nan)
     return run.assign(
-        position=(("time", "particle", "xyz"), position), speed=(("time", "particle"), speed)
-    ).assign_coords(time=TIMES)
+        position=(("snapshot", "particle", "xyz"), position), speed=(("snapshot", "particle"), speed)
+    ).assign_coords(snapshot_time=("snapshot", TIMES))
 
 
 @pytest.fixture
@@ -138,6 +138,13 @@ def test_stills_of_a_run_with_snapshots_are_the_nearest_ones(recorded):
     stills = moments.stills(recorded)
     assert [stills[name].time for name in ("opening", "half")] == [0.0, 0.6]
     assert moments.half_time(recorded) == pytest.approx(0.5, abs=0.12)
+
+
+def test_snapshots_are_left_out_where_runs_are_gathered(recorded, tmp_path):
+    """All runs of a plan with them may be larger than the memory."""
+    files.write_netcdf(recorded, tmp_path / "a_rep_1.nc")
+    (run,) = dataset.read_runs([tmp_path / "a_rep_1.nc"]).values()
+    assert "snapshot" not in run.dims and "exit_time" in run
 
 
 def arrays(path):

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 
 DOCS = provenance.PACKAGE.parents[1] / "docs"
 DATASET, RUN = "dataset.nc", "simulations/exp_01_rep_1.nc"
-SNAPSHOTS = {"time", "position", "speed"}
+SNAPSHOTS = {"snapshot_time", "position", "speed"}
 
 
 def described(section):
@@ -87,4 +87,5 @@ def test_the_example_draws_figure_3(finished, tmp_path):
 
 def test_a_run_of_the_study_can_be_drawn(finished, tmp_path):
     stills = movie.write(finished.directory / "results" / RUN, tmp_path / "run", "height", "gif")
-    assert [path.name for path in stills] == ["run_opening.png", "run_half.png"]
+    # Its few particles fall so fast that no sample of the run sees the half of them.
+    assert [path.name for path in stills] == ["run_opening.png"]
