@@ -177,12 +177,13 @@ def _data_point(run: xr.Dataset, target: np.ndarray, unusable: bool) -> xr.Datas
     if unusable:
         scalars = scalars.assign({name: scalars[name].where(False) for name in (*RESULTS, indices.ORDER)})
     of_sizes = indices.of_outflow(fraction, variance, target)
+    by_size: dict = {name: ("size_class", values) for name, values in of_sizes.items()}
     return scalars.assign(
         mass_fraction=(("size_class", "M"), fraction),
         counting_variance=(("size_class", "M"), variance),
         J=("size_class", outflow.objective(fraction, target)),
         U=("size_class", outflow.corrected_square(fraction, target, variance)),
-        **{name: ("size_class", values) for name, values in of_sizes.items()},
+        **by_size,
     )
 
 
@@ -273,9 +274,10 @@ def table_of_runs(dataset: xr.Dataset) -> pd.DataFrame:
     if "filling_level" in table:
         table["filling_level_mm"] = 1e3 * table.pop("filling_level")
     for name in ("J", *indices.OF_SIZES):
-        values = outflow.signed_root(stacked[name]) if name.startswith("U_") else stacked[name]
         for size in dataset["size_class"].values:
-            table[f"{name.replace('U_', 'J_')}_{size}"] = values.sel(size_class=size).values
+            values = stacked[name].sel(size_class=size).values
+            printed = outflow.signed_root(values) if name.startswith("U_") else values
+            table[f"{name.replace('U_', 'J_')}_{size}"] = printed
     return pd.DataFrame(table)
 
 

@@ -141,10 +141,9 @@ def aliased(terms: Mapping[str, np.ndarray], fitted) -> dict[str, float]:
         others = [other for key, other in terms.items() if (key in fitted) != (name in fitted)]
         square = float(values @ values)
         if others and square > LEAST:
-            others = np.column_stack(others)
-            shares[name] = (
-                1 - float(np.sum((values - others @ np.linalg.lstsq(others, values)[0]) ** 2)) / square
-            )
+            matrix = np.column_stack(others)
+            rest = values - matrix @ np.linalg.lstsq(matrix, values)[0]
+            shares[name] = 1 - float(np.sum(rest**2)) / square
     return shares
 
 
