@@ -395,6 +395,7 @@ class Optimise(Model):
     crossover_probability: Share = 0.9
     mutation_probability: Share = 0.1
     seed: Seed = 1
+    seeds: Annotated[int, Number(least=1, most=100)] = 3
     select: Literal["knee", "compromise", "explicit"] = "knee"
     explicit: dict[Name, Finite] = {}
 

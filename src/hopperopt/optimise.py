@@ -2,7 +2,7 @@
 
 import logging
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,24 +11,24 @@ import xarray as xr
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.callback import Callback
 from pymoo.core.problem import Problem
+from pymoo.indicators.hv import HV
 from pymoo.operators.crossover.sbx import SBX
 from pymoo.operators.mutation.pm import PM
 from pymoo.optimize import minimize
 
 from hopperopt.files import write_netcdf, write_table, write_yaml
-from hopperopt.select import select
+from hopperopt.optimum import OBJECTIVES, choose, non_dominated, spread, widened
 from hopperopt.surrogate import prediction
 from hopperopt.surrogate.features import OUTPUTS, factor_grid, violation
 
-OBJECTIVES = tuple(f"J_{name}" for name in OUTPUTS)
 GRID_DESIGNS = 10_000  # size of the grid on which impossible predictions are counted, about
-NEAR_BOUND = 0.01  # of a factor's range
+MARGIN = 0.1  # of the fronts' range, from their worst point to the corner of their hypervolumes
 
 log = logging.getLogger(__name__)
 
 
 class Front(NamedTuple):
-    """Non-dominated designs of the last generation, by rising J of the fine particles."""
+    """Non-dominated designs, by rising J of the fine particles."""
 
     designs: np.ndarray  # (n, factors)
     objectives: np.ndarray  # (n, 2)
@@ -45,23 +45,89 @@ def optimise(
     """Search the factors' ranges for designs with small J_f and J_i, and choose one.
 
     params: `bounds` {factor: [low, high]}, `population`, `generations`, `crossover_probability`,
-    `mutation_probability`, `seed`, `select` (knee, compromise or explicit), `explicit` (a design or None),
-    `centre` (a design), all in the factors' own units. surrogate: path of model.nc; front, history, selected:
-    paths of front.csv, history.nc and selected.yaml.
+    `mutation_probability`, `seed`, `seeds` (number of searches, from `seed` on), `select` (knee, compromise
+    or explicit), `explicit` (a design or None), `centre` (a design), all in the factors' own units.
+    surrogate: path of model.nc; front, history, selected: paths of front.csv, history.nc and selected.yaml.
     """
     predictor = prediction.load(surrogate)
     bounds = np.array([params["bounds"][name] for name in predictor.factors], dtype=float)
-    found, record = search(predictor, bounds, params)
-    choice = _choose(params, predictor, bounds, found)
-    impossible = count_impossible(predictor, bounds)
+    searches = search_all(predictor, bounds, params)
+    fronts = [found for found, _ in searches]
+    found = merged(fronts)
+    index, choice = choose(params, predictor, bounds, found.designs, found.objectives)
+    choice["beyond_bounds"] = None if index < 0 else beyond(params, predictor, bounds, found.designs[index])
+    if choice["beyond_bounds"]:
+        choice["warning"] += f"; {_in_words(choice['beyond_bounds'])}"
+    if choice["warning"] is not None:
+        log.warning(choice["warning"])
     table = pd.DataFrame(
         np.hstack([found.designs, found.objectives]), columns=[*predictor.factors, *OBJECTIVES]
     )
     table["feasible"] = found.violation <= 0
-    table["selected"] = np.arange(len(table)) == choice.pop("index")
+    table["selected"] = np.arange(len(table)) == index
     write_table(table, front)
-    write_netcdf(_history(record, predictor.factors), history)
-    write_yaml({**choice, "front_points": len(table), "infeasible_grid_predictions": impossible}, selected)
+    write_netcdf(_history([record for _, record in searches], predictor.factors), history)
+    choice |= {
+        "choice_over_draws": spread(params, predictor, bounds, found.designs),
+        "front_points": len(table),
+        "hypervolume_of_each_search": agreement(fronts, found),
+        "infeasible_grid_predictions": count_impossible(predictor, bounds),
+    }
+    write_yaml(choice, selected)
+
+
+def search_all(
+    predictor: prediction.Predictor, bounds: np.ndarray, params: Mapping
+) -> list[tuple[Front, list]]:
+    """Run `search` with each seed, params["seeds"] of them from params["seed"] on."""
+    seeds = range(params["seed"], params["seed"] + params["seeds"])
+    return [search(predictor, bounds, params | {"seed": seed}) for seed in seeds]
+
+
+def merged(fronts: Sequence[Front]) -> Front:
+    """The front of all searches; of infeasible points only the least infeasible one, where all are."""
+    points = Front(*(np.concatenate(parts) for parts in zip(*fronts, strict=True)))
+    feasible = np.flatnonzero(points.violation <= 0)
+    if not feasible.size:
+        feasible = np.argmin(points.violation, keepdims=True)
+    rows = feasible[non_dominated(points.objectives[feasible])]
+    rows = rows[np.argsort(points.objectives[rows, 0], kind="stable")]
+    return Front(*(item[rows] for item in points))
+
+
+def agreement(fronts: Sequence[Front], whole: Front) -> list[float | None]:
+    """Hypervolume of each search's front over that of them all; None where a front is a point."""
+    everything = np.concatenate([front.objectives for front in fronts])
+    corner = everything.max(axis=0) + MARGIN * np.ptp(everything, axis=0)
+    volume = HV(ref_point=corner)
+    if not (total := volume(whole.objectives)) > 0:
+        return [None] * len(fronts)
+    return [float(volume(front.objectives) / total) for front in fronts]
+
+
+def beyond(
+    params: Mapping, predictor: prediction.Predictor, bounds: np.ndarray, design: np.ndarray
+) -> dict | None:
+    """What is chosen where the bounds (factors, 2) that a design (factors,) lies on are moved outward.
+
+    There the surrogate extrapolates, and whether such an insert fits is not looked at. None where the design
+    lies on no bound.
+    """
+    wider = widened(bounds, design)
+    if wider is None:
+        return None
+    found = merged([front for front, _ in search_all(predictor, wider, params)])
+    _, choice = choose(params, predictor, wider, found.designs, found.objectives)
+    ranges = dict(zip(predictor.factors, wider.tolist(), strict=True))
+    return {"ranges": ranges, **{name: choice[name] for name in ("design", "predicted", "rule")}}
+
+
+def _in_words(choice):
+    """The choice beyond the bounds, as a warning."""
+    values = [
+        f"{name} = {value:.4g}" for part in ("design", "predicted") for name, value in choice[part].items()
+    ]
+    return f"an extrapolation, with ranges a fifth wider there: {', '.join(values)}"
 
 
 def search(predictor: prediction.Predictor, bounds: np.ndarray, params: Mapping) -> tuple[Front, list]:
@@ -134,48 +200,11 @@ class _Record(Callback):
         self.generations.append([algorithm.pop.get(name) for name in ("X", "F", "G")])
 
 
-def _choose(params, predictor, bounds, found):
-    """Choose a design: the head of selected.yaml, and its `index` in the front (-1: not of the front)."""
-    centre = predictor.objectives(predictor.array(params["centre"]))[0]
-    warnings = []
-    if params["select"] == "explicit":
-        index, rule, design = -1, "explicit", predictor.array(params["explicit"])
-    else:
-        index, rule, warning = select(params["select"], found.objectives, centre, predictor.objective_error)
-        design = found.designs[[index]]
-        warnings += [] if warning is None else [warning]
-        warnings += _on_bounds(predictor.factors, design[0], bounds)
-    feasible = violation(predictor.curves(design))[0] <= 0
-    if not feasible:
-        warnings.append("the surrogate predicts impossible mass fractions for the selected design")
-    warning = "; ".join(warnings) or None
-    if warning is not None:
-        log.warning(warning)
-    return {
-        "design": dict(zip(predictor.factors, design[0], strict=True)),
-        "predicted": dict(zip(OBJECTIVES, predictor.objectives(design)[0], strict=True)),
-        "feasible": bool(feasible),
-        "rule": rule,
-        "warning": warning,
-        "predicted_centre": dict(zip(OBJECTIVES, centre, strict=True)),
-        "index": index,
-    }
-
-
-def _on_bounds(factors, design, bounds):
-    """A sentence for every factor of a design (factors,) that the search's bounds (factors, 2) hold back."""
-    return [
-        f"{name} = {value:.5g} lies on the bound {bound:g} of its range: the optimum may lie beyond"
-        for name, value, limits in zip(factors, design, bounds, strict=True)
-        for bound in limits
-        if abs(value - bound) <= NEAR_BOUND * np.ptp(limits)
-    ]
-
-
-def _history(record, factors):
-    """Dataset of all generations, the first the random initial population."""
-    X, F, G = (np.stack(arrays) for arrays in zip(*record, strict=True))
-    dimensions = ("generation", "individual")
+def _history(records, factors):
+    """Dataset of all generations of each search, the first the random initial population."""
+    searches = [[np.stack(arrays) for arrays in zip(*record, strict=True)] for record in records]
+    X, F, G = (np.stack(arrays) for arrays in zip(*searches, strict=True))
+    dimensions = ("search", "generation", "individual")
     return xr.Dataset(
         {
             "X": ((*dimensions, "factor"), X, {"long_name": "design, in the factors' units"}),
@@ -187,8 +216,9 @@ def _history(record, factors):
             ),
         },
         coords={
-            "generation": np.arange(1, len(X) + 1),
-            "individual": np.arange(X.shape[1]),
+            "search": np.arange(1, len(X) + 1),
+            "generation": np.arange(1, X.shape[1] + 1),
+            "individual": np.arange(X.shape[2]),
             "factor": list(factors),
             "objective": list(OBJECTIVES),
             "constraint": ["violation"],

@@ -20,6 +20,7 @@ PARAMS = {
     "crossover_probability": 0.9,
     "mutation_probability": 0.1,
     "seed": 1,
+    "seeds": 1,
     "select": "knee",
     "explicit": {},
     "centre": {"theta_deg": 55, "length_mm": 40, "height_mm": 29.6},
@@ -117,7 +118,8 @@ def test_outputs_agree_with_each_other_and_with_the_network(run):
     assert list(selected["predicted"].values()) == predicted.tolist()
     assert selected["front_points"] == len(table)
 
-    assert history["F"].shape == (30, 100, 2)
+    assert history["F"].shape == (1, 30, 100, 2)
+    history = history.isel(search=0)
     np.testing.assert_allclose(history["F"][7], model.objectives(history["X"][7].values), rtol=1e-12)
     assert ((history["X"] >= BOUNDS[:, 0]) & (history["X"] <= BOUNDS[:, 1])).all()
     last = history.isel(generation=-1)
@@ -149,6 +151,7 @@ def test_explicit_design_is_taken_as_it_is(run):
     design = {"height_mm": 33.0, "theta_deg": 56.7, "length_mm": 32.4}
     table, _, selected = run(select="explicit", explicit=design)
     assert selected["design"] == design and selected["rule"] == "explicit"
+    assert selected["beyond_bounds"] is None and selected["choice_over_draws"] is None
     assert not table["selected"].any()
     model = predictor()
     assert list(selected["predicted"].values()) == model.objectives(model.array(design))[0].tolist()
@@ -168,15 +171,52 @@ def test_optimum_on_a_bound_is_warned_of_until_the_range_reaches_beyond(run, cap
     shut_in = run()[2]
     value = shut_in["design"]["theta_deg"]
     expected = f"theta_deg = {value:.5g} lies on the bound 50 of its range: the optimum may lie beyond"
-    assert shut_in["warning"] == expected
-    assert expected in caplog.text
+    on_bound, outside = shut_in["warning"].split("; ")
+    assert on_bound == expected
+    assert shut_in["warning"] in caplog.text
+
+    # What a range a fifth wider gives stands beside it, and is what a search there chooses.
+    wide = RANGES | {"theta_deg": [48, 60]}
+    beyond = shut_in["beyond_bounds"]
+    assert beyond["ranges"] == wide and 48 <= beyond["design"]["theta_deg"] < 50
+    there = run(bounds=wide)[2]
+    assert {name: there[name] for name in ("design", "predicted", "rule")} | {"ranges": wide} == beyond
+    assert (
+        outside.startswith("an extrapolation")
+        and f"theta_deg = {beyond['design']['theta_deg']:.4g}" in outside
+    )
 
     wider = run(bounds=RANGES | {"theta_deg": [40, 60]})[2]
     assert 41 < wider["design"]["theta_deg"] < 49
-    assert "theta_deg" not in (wider["warning"] or "")
+    assert "theta_deg" not in wider["warning"].split(": ")[0]
 
     both = run(model=predictor()._replace(objective_error=np.array([1.0, 1.0])))[2]["warning"].split("; ")
-    assert [part.split(" ", 1)[0] for part in both] == ["no", "theta_deg"]
+    assert [part.split(" ", 1)[0] for part in both] == ["no", "theta_deg", "an"]
+
+
+def test_fronts_of_several_searches_are_joined(run, grid):
+    """Short searches, none of which finds the whole front."""
+    table, history, selected = run(seeds=3, generations=6)
+    fronts = [
+        optimise.search(predictor(), BOUNDS, PARAMS | {"generations": 6, "seed": seed})[0]
+        for seed in (1, 2, 3)
+    ]
+    points = np.concatenate([front.objectives for front in fronts])
+    np.testing.assert_allclose(table[["J_fine", "J_intermediate"]], pareto(points), rtol=1e-8)
+    assert history.sizes["search"] == 3
+    shares = selected["hypervolume_of_each_search"]
+    assert all(0.5 < share < 1 for share in shares)
+    volume = HV(ref_point=points.max(axis=0) + 0.1 * np.ptp(points, axis=0))
+    assert shares == pytest.approx([volume(front.objectives) / volume(points) for front in fronts])
+
+
+def test_a_front_of_feasible_points_has_no_others(run):
+    """A search that finds nothing possible adds nothing, were its objectives the best."""
+    one = optimise.Front(np.ones((1, 3)), np.array([[0.1, 0.1]]), np.array([0.2]))
+    other = optimise.Front(2 * np.ones((2, 3)), np.array([[0.3, 0.2], [0.2, 0.3]]), np.array([-0.1, -0.2]))
+    assert optimise.merged([one, other]).objectives.tolist() == [[0.2, 0.3], [0.3, 0.2]]
+    assert optimise.merged([one, one._replace(violation=np.array([0.1]))]).violation.tolist() == [0.1]
+    assert optimise.agreement([one], one) == [None]
 
 
 def test_nothing_possible_gives_the_least_impossible_and_says_so(run, caplog):

@@ -166,6 +166,7 @@ OTHER = {
     "optimise.crossover_probability": 0.8,
     "optimise.mutation_probability": 0.2,
     "optimise.seed": 2,
+    "optimise.seeds": 2,
     "optimise.select": "compromise",
     "optimise.explicit": {"theta_deg": 55, "length_mm": 40, "height_mm": 30},
     "verification.replicates": 2,
