@@ -60,7 +60,7 @@ def mistakes(study, faulty):
         return found
     if {"plan values", "case values"} & blocked:  # not all designs are known, the hopper is
         return found + findings.refusals(study.without_insert())
-    return found + list(_grouped(_designs(study), findings.refused))
+    return found + list(_grouped(designs(study), findings.refused))
 
 
 def _factor_keys(study):
@@ -186,7 +186,7 @@ def _cases(study):
     """Verification cases that fix a design fix all factors; their names are no experiment's."""
     for name, case in study.verification.cases.items():
         if isinstance(case, dict) and set(case) != set(study.factors):
-            allowed = f"a number for each of {', '.join(study.factors)}"
+            allowed = f"a number for each of {', '.join(study.factors)}, or null to leave the case out"
             yield mistake(f"verification.cases.{name}", case, allowed)
 
 
@@ -229,21 +229,21 @@ def _case_values(study):
             yield f"{place}: {error}"
 
 
-def _designs(study):
+def designs(study):
     """(name, labels, setup) of every simulation whose design the configuration knows."""
-    designs = dict(study.experiments())
+    known = dict(study.experiments())
     if study.optimise.select == "explicit":
-        designs["optimise.explicit"] = study.optimise.explicit
-    designs |= {name: case for name, case in study.cases().items() if not isinstance(case, str)}
+        known["optimise.explicit"] = study.optimise.explicit
+    known |= {name: case for name, case in study.cases().items() if not isinstance(case, str)}
     return [
         (name, design or {}, study.without_insert() if design is None else study.with_design(design))
-        for name, design in designs.items()
+        for name, design in known.items()
     ]
 
 
 def warnings(study):
     """Sentences for what is allowed but unusual, in the designs and at the corners of the optimiser's box."""
-    found = list(_grouped(_designs(study), findings.unusual))
+    found = list(_grouped(designs(study), findings.unusual))
     corners = plans.corners(study.levels) if 2 ** len(study.factors) <= MOST_CORNERS else []
     extremes = [("a corner", corner, study.with_design(corner)) for corner in corners]
     refused = _grouped(extremes, findings.refused)

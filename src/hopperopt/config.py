@@ -59,10 +59,25 @@ class Number(Quantity):
 
         return core_schema.no_info_before_validator_function(read, handler(source))
 
+    def __get_pydantic_json_schema__(self, core, handler):
+        """The annotated type with the bounds where it is a number."""
+        made = handler(core)
+        bounds = {
+            "exclusiveMinimum": self.above,
+            "minimum": self.least,
+            "exclusiveMaximum": self.below,
+            "maximum": self.most,
+        }
+        for kind in made.get("anyOf", [made]):
+            if kind.get("type") in ("number", "integer"):
+                kind |= {word: bound for word, bound in bounds.items() if bound is not None}
+        return made
+
 
 Seconds = Annotated[float, Number(above=0, most=10_000)]
 Length = Annotated[float, Number(least=0.001, most=100_000)]  # from a micrometre
 Coordinate = Annotated[float, Number(least=-100_000, most=100_000)]
+Slope = Annotated[float, Number(least=1, most=89)]
 Density = Annotated[float, Number(least=10, most=100_000)]
 Speed = Annotated[float, Number(least=0, most=100)]
 Friction = Annotated[float, Number(least=0, most=10)]
@@ -78,15 +93,18 @@ Name = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$")]
 class Model(BaseModel):
     """A section: frozen, no other keys than its own."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 class Hopper(Model):
     """A conical hopper below a cylinder."""
 
     outlet_radius_mm: Length = 22.5
+    """Radius of the outlet."""
     half_angle_deg: Annotated[float, Number(least=1, most=90)] = 45.0
+    """Angle of the cone's wall from the vertical; 90 is a flat bottom."""
     cylinder_radius_mm: Length = 50.0
+    """Radius of the cylinder above the cone."""
 
     @property
     def _shape(self):
@@ -105,21 +123,75 @@ class Hopper(Model):
 class Cone(Model):
     """A solid cone, apex up: slope angle from the horizontal, length along the slope."""
 
-    slope_deg: Annotated[float, Number(least=1, most=89)] = 55.0
+    slope_deg: Slope = 55.0
+    """Slope from the horizontal."""
     length_mm: Length = 40.0
+    """Length along the slope, from the edge of the base to the apex."""
 
     def profile(self):
         """Profile above the insert's height (m)."""
         return geometry.cone(self.slope_deg, self.length_mm / MM)
 
 
+class DoubleCone(Model):
+    """Two solid cones base to base: slope angles from the horizontal, length along the upper slope."""
+
+    lower_slope_deg: Slope = 60.0
+    """Slope of the lower cone, from the horizontal."""
+    upper_slope_deg: Slope = 55.0
+    """Slope of the upper cone, from the horizontal."""
+    length_mm: Length = 30.0
+    """Length along the upper cone's slope, which sets the radius of the common base."""
+
+    def profile(self):
+        """Profile above the insert's height (m)."""
+        return geometry.double_cone(self.lower_slope_deg, self.upper_slope_deg, self.length_mm / MM)
+
+
+class Bullet(Model):
+    """A solid cylinder below a conical nose."""
+
+    radius_mm: Length = 20.0
+    """Radius of the cylinder."""
+    cylinder_length_mm: Length = 10.0
+    """Height of the cylinder."""
+    nose_slope_deg: Slope = 55.0
+    """Slope of the nose, from the horizontal."""
+
+    def profile(self):
+        """Profile above the insert's height (m)."""
+        return geometry.bullet(self.radius_mm / MM, self.cylinder_length_mm / MM, self.nose_slope_deg)
+
+
+class ConeInCone(Model):
+    """A hollow cone, wide end up, open at both ends; its upper rim falls outwards: nothing rests on it."""
+
+    slope_deg: Slope = 70.0
+    """Slope of the inner face, from the horizontal."""
+    length_mm: Length = 30.0
+    """Length along the inner face."""
+    opening_radius_mm: Length = 12.0
+    """Radius of the opening at the bottom, inside."""
+    thickness_mm: Length = 2.0
+    """Thickness of the sheet."""
+
+    def profile(self):
+        """Profile above the insert's height (m)."""
+        sizes = (self.length_mm, self.opening_radius_mm, self.thickness_mm)
+        return geometry.cone_in_cone(self.slope_deg, *(size / MM for size in sizes))
+
+
 class Profile(Model):
     """A body of one's own: points r, z (z from the insert's height), in a CSV file or typed in."""
 
     file: Annotated[str, StringConstraints(min_length=1)] | None = None
+    """CSV file with the columns `r_mm` and `z_mm`, from one end of the line to the other; z from the
+    insert's height. A line with both ends on the axis, or one that closes, is a solid body, any other a
+    shell without thickness."""
     points_mm: Annotated[
         tuple[tuple[Coordinate, Coordinate], ...] | None, Field(min_length=2, max_length=1000)
     ] = None
+    """The same points typed in, `[[r, z], ...]`."""
 
     def profile(self):
         """Profile above the insert's height (m)."""
@@ -129,9 +201,14 @@ class Profile(Model):
 class Insert(Model):
     """The body in the hopper; `shape` picks one of the sections below it."""
 
-    shape: Literal["cone", "profile", "none"] = "cone"
+    shape: Literal["cone", "double_cone", "bullet", "cone_in_cone", "profile", "none"] = "cone"
+    """Which of the sections below counts; `none` is the bare hopper."""
     height_mm: Length = 29.6
+    """Height of the insert's lowest point above the outlet."""
     cone: Cone = Cone()
+    double_cone: DoubleCone = DoubleCone()
+    bullet: Bullet = Bullet()
+    cone_in_cone: ConeInCone = ConeInCone()
     profile: Profile = Profile()
 
     def polyline(self):
@@ -151,9 +228,13 @@ class Particles(Model):
     """Spheres: equal numbers of three diameters, one material."""
 
     diameters_mm: Annotated[tuple[Length, ...], AfterValidator(_ascending)] = (2.0, 3.0, 4.0)
+    """Fine, intermediate and coarse diameter, ascending or equal; equal numbers of each."""
     density_kg_m3: Density = 2285.0
+    """Density of the spheres."""
     shear_modulus_pa: Annotated[float, Number(least=1000, most=1e13)] = 1.0e7
+    """Shear modulus of the spheres."""
     poisson_ratio: Poisson = 0.25
+    """Poisson's ratio of the spheres."""
 
     @property
     def diameters(self):
@@ -171,29 +252,38 @@ class Wall(Model):
     """Material of hopper, gate and insert; an infinite modulus is a rigid wall."""
 
     shear_modulus_pa: Annotated[float, Number(least=1000, most=1e13, infinite=True)] = 2.2e7
+    """Shear modulus of the wall; `.inf` is a rigid one."""
     poisson_ratio: Poisson = 0.25
+    """Poisson's ratio of the wall."""
 
 
 class ParticleContact(Model):
     """Particle against particle."""
 
     static_friction: Friction = 0.5
+    """Coefficient of friction between particles."""
     rolling_friction: Friction = 0.05
+    """Coefficient of rolling friction between particles."""
     restitution: Share = 0.7
+    """Coefficient of restitution between particles."""
 
 
 class WallContact(Model):
     """Particle against hopper, gate and insert."""
 
     static_friction: Friction = 0.5
+    """Coefficient of friction with the wall."""
     rolling_friction: Friction = 0.25
+    """Coefficient of rolling friction on the wall."""
     restitution: Share = 0.2
+    """Coefficient of restitution at the wall."""
 
 
 class Contact(Model):
     """The contact law's numbers; `rolling` names the model of rolling friction."""
 
     rolling: Literal["edem", "cdt", "none"] = "edem"
+    """Model of rolling friction: EDEM's constant torque, LIGGGHTS' `cdt`, or none."""
     particle: ParticleContact = ParticleContact()
     wall: WallContact = WallContact()
 
@@ -208,39 +298,58 @@ class Filling(Model):
     """How the hopper is filled: up to a level, or with a fixed number of particles."""
 
     level_mm: Length = 74.0
+    """Height of the settled bed's surface above the outlet; sets the number of particles."""
     particles: Annotated[
         int | None, Number(least=3, most=findings.MOST_PARTICLES), AfterValidator(_thirds)
     ] = None
+    """Number of particles, a multiple of 3, in the level's place; null goes by the level."""
     bed_solid_fraction: Annotated[float, Number(above=0, most=0.74)] = 0.55
+    """Solid fraction of the settled bed, from which the number follows."""
     column_solid_fraction: Annotated[float, Number(above=0, most=0.3)] = 0.2
+    """Solid fraction of the falling column at the start."""
     speed_m_s: Speed = 0.5
+    """Downward speed of the column at the start."""
     speed_scatter_m_s: Speed = 0.05
+    """Standard deviation of each component of the particles' speed at the start."""
     settling_limit_s: Seconds = 1.5
+    """When the outlet opens at the latest; a bed that still moves marks the run as unsettled."""
 
 
 class Discharge(Model):
     """How the discharge is measured, and what becomes of one that does not end."""
 
     sensor_mm: Annotated[float, Number(least=-100_000, below=0)] = -12.0
+    """Height, below the outlet, of the plane where a particle counts as out."""
     idle_limit_s: Seconds = 0.5
+    """The run ends when nothing has left for so long."""
     time_limit_s: Seconds = 10.0
+    """The run ends so long after the opening at the latest."""
     incomplete: Literal["refuse", "drop"] = "refuse"
+    """What becomes of runs that jammed or did not end well: they stop the study, or are dropped from it."""
 
 
 class Simulation(Model):
     """Time step (`auto`: a fifth of the Rayleigh time), gravity; threads, checkpoints, snapshots of a run."""
 
     time_step_s: Annotated[float | Literal["auto"], Number(above=0)] = 4.0e-5
+    """Time step; `auto` is a fifth of the smallest sphere's Rayleigh time."""
     gravity_m_s2: Annotated[float, Number(least=0.001, most=1000)] = 9.81
+    """Acceleration of gravity."""
     threads: Annotated[int, Number(least=1, most=1024)] = 1
+    """Threads of one simulation, which change its speed and nothing else; they pay from about 10,000
+    particles on."""
     checkpoint_minutes: Annotated[float | None, Number(above=0, most=100_000)] = 5.0
+    """How often a running simulation saves its state, to go on from when interrupted; null is never."""
     snapshot_interval_s: Annotated[float | None, Number(least=0.01, most=10_000)] = None
+    """Interval of the positions and speeds that a run's file keeps for movies; null keeps none. At 0.02 s they
+    take some 20 MB a run."""
 
 
 class Setup(Model):
     """All that one simulation needs."""
 
     seed: Seed = 1
+    """Seed of all fillings; each run's own follows from it, the run's name and its replicate."""
     hopper: Hopper = Hopper()
     insert: Insert = Insert()
     particles: Particles = Particles()
@@ -269,6 +378,15 @@ class Setup(Model):
     def insert_profile(self):
         """The insert's polyline (m), None without one."""
         return self.insert.polyline()
+
+    @cached_property
+    def wall_gap(self):
+        """Shortest distance (m) between insert and hopper: 0 for one that is not inside, infinite without."""
+        if self.insert_profile is None:
+            return math.inf
+        vessel = self.hopper.profile(self.column_bottom)
+        inside = geometry.stays_inside(self.insert_profile, vessel)
+        return geometry.gap(self.insert_profile, vessel) if inside else 0.0
 
     @property
     def column_bottom(self):
@@ -304,7 +422,11 @@ class Factor(Model):
     """A number of the configuration that the designs vary, and its levels."""
 
     key: str
+    """The number that the factor varies, by its dotted key: any of hopper, insert, particles (but the
+    diameters), wall, contact, filling, discharge or simulation."""
     levels: Annotated[tuple[Finite, ...], Field(min_length=2, max_length=plans.MOST_EXPERIMENTS)]
+    """Its levels, in the key's unit: five for `l25`; other plans and the optimiser use the smallest and
+    largest."""
 
 
 def _power_of_two(count):
@@ -317,7 +439,9 @@ class Hypercube(Model):
     """Latin hypercube within the ranges of the levels."""
 
     experiments: Annotated[int, Number(least=2, most=plans.MOST_EXPERIMENTS)] = 25
+    """Number of experiments."""
     seed: Seed = 1
+    """Seed of the plan."""
 
 
 class Sobol(Model):
@@ -326,20 +450,25 @@ class Sobol(Model):
     experiments: Annotated[
         int, Number(least=2, most=plans.MOST_EXPERIMENTS), AfterValidator(_power_of_two)
     ] = 32
+    """Number of experiments, a power of two."""
     seed: Seed = 1
+    """Seed of the plan."""
 
 
 class OwnPlan(Model):
     """A plan of one's own: a CSV file, read when the configuration is."""
 
     file: Annotated[str, StringConstraints(min_length=1)] = "plan.csv"
+    """CSV file with a column `experiment` and one for each factor."""
 
 
 class Design(Model):
     """Which designs are simulated, and how often."""
 
     plan: Literal["l25", "lhs", "sobol", "csv"] = "l25"
+    """Orthogonal array of 25 experiments, Latin hypercube, Sobol' points, or a CSV file of one's own."""
     replicates: Count = 3
+    """Independent fillings of each design."""
     lhs: Hypercube = Hypercube()
     sobol: Sobol = Sobol()
     csv: OwnPlan = OwnPlan()
@@ -349,6 +478,7 @@ class Validation(Model):
     """The comparison of the surrogates, each experiment left out once."""
 
     starts: Count = 20
+    """Initial weight sets for each size, in the comparison of the surrogates."""
 
 
 PAPERS_NETWORK = {"selected_hidden_nodes": 7, "clip_sigma": 3.0}
@@ -358,15 +488,25 @@ class Surrogate(Model):
     """The surrogate: which model; filter, split, hidden sizes and starts of networks."""
 
     model: Literal["auto", "paper", "network", "ensemble", "gaussian"] = "auto"
+    """By comparison at experiments not seen (`auto`), or the one that is named; `paper` is a network with 7
+    hidden nodes on targets clipped at 3 standard deviations, whatever else is set."""
     clip_sigma: Annotated[float | None, Number(above=0)] = 3.0
+    """Limit of the targets' filter in standard deviations; null for none."""
     hidden_nodes: Annotated[tuple[Nodes, ...], Field(min_length=1)] = (3, 4, 5, 6, 7, 8, 9, 10)
+    """Numbers of hidden nodes of the networks that are trained."""
     starts: Count = 100
+    """Initial weight sets for each of these sizes."""
     selected_hidden_nodes: Annotated[int | Literal["auto"], Number(least=1, most=200)] = "auto"
+    """One of these sizes; `auto` chooses by cross-validation."""
     split: Literal["experiments", "points"] = "experiments"
+    """Into training, validation and test: whole experiments, or points as the paper."""
     validation_experiments: Count = 4
+    """Experiments that stop the training."""
     test_experiments: Count = 4
+    """Experiments that choose nothing and tell the error."""
     validation: Validation = Validation()
     seed: Seed = 1
+    """Seed of split and weights."""
 
     @property
     def networks(self):
@@ -391,13 +531,21 @@ class Optimise(Model):
     """NSGA-II and the choice from its front."""
 
     population: Annotated[int, Number(least=4, most=10_000)] = 100
+    """Designs in a generation of NSGA-II."""
     generations: Count = 30
+    """Generations, the first one included."""
     crossover_probability: Share = 0.9
+    """Probability of crossover."""
     mutation_probability: Share = 0.1
+    """Probability of mutation of each variable."""
     seed: Seed = 1
+    """Seed of the search."""
     seeds: Annotated[int, Number(least=1, most=100)] = 3
+    """Searches, each from another seed (`seed` and the next ones); their fronts are joined."""
     select: Literal["knee", "compromise", "explicit"] = "knee"
+    """The front's knee, its best compromise, or the design named below."""
     explicit: dict[Name, Finite] = {}
+    """With `select: explicit`, a number for each factor, within its levels."""
 
 
 PAPERS_OPTIMUM = {"theta_deg": 56.7, "length_mm": 32.4, "height_mm": 33.0}  # the optimum of Yu and Saxén
@@ -418,19 +566,24 @@ def _read_case(value):
         raise NotAllowed(allowed) from None
 
 
-Case = Annotated[str | dict[str, float], BeforeValidator(_read_case)]
+Case = Annotated[Literal[*DERIVED, *FIXED] | dict[str, float], BeforeValidator(_read_case)]
 
 
 class Verification(Model):
     """The designs that are simulated anew, by name, and how often."""
 
     replicates: Count = 10
+    """Fillings of each case."""
     replicates_of: dict[Name, Count] = {"selected": 20, "plan_best": 20}
+    """Fillings of single cases that have another number, by name."""
     cases: Annotated[dict[Name, Case], Field(min_length=1, max_length=plans.MOST_EXPERIMENTS)] = {
         **{word: word for word in (*DERIVED, "plan_centre")},
         "paper": PAPERS_OPTIMUM,
         "bare": "bare",
     }
+    """The designs that are simulated anew, by name: a word (`selected`; the front's ends `best_f` and
+    `best_i`; `plan_best`; `plan_centre`, the middle levels; `bare`, no insert), or a number for each
+    factor."""
 
     @property
     def words(self):
@@ -446,6 +599,7 @@ class Figures(Model):
     """How the figures are drawn."""
 
     dpi: Annotated[int, Number(least=50, most=1200)] = 200
+    """Resolution of the PNG files, dots per inch."""
 
 
 def _results_dir(value):
@@ -466,7 +620,9 @@ class Study(Setup):
     """The whole study."""
 
     results_dir: Annotated[str, AfterValidator(_results_dir)] = "results"
+    """Folder of everything that the study writes."""
     factors: Annotated[dict[Name, Factor], Field(min_length=1)] = Field(default_factory=_paper_factors)
+    """What the designs vary, by name."""
     design: Design = Design()
     surrogate: Surrogate = Surrogate()
     optimise: Optimise = Optimise()
@@ -595,6 +751,30 @@ def run_seed(seed, name, replicate):
     """Seed (48 bits) of one run, from the study's seed, the run's name and its replicate's number."""
     digest = hashlib.sha256(json.dumps([seed, name, replicate]).encode()).digest()
     return int.from_bytes(digest[:6], "big")
+
+
+def json_schema():
+    """JSON schema of a document, an override included: no key is required, entries by name may be null."""
+    made = Study.model_json_schema()
+    for part in (made, *made["$defs"].values()):
+        part.pop("required", None)
+        for entries in part["properties"].values():
+            entries.pop("title", None)
+            if "description" in entries:
+                entries["description"] = " ".join(entries["description"].split())
+            if "$ref" in entries:
+                entries.pop("default", None)
+            for kind in ("patternProperties", "additionalProperties"):
+                if isinstance(entries.get(kind), dict):
+                    entries[kind] = _or_null(entries[kind], kind == "patternProperties")
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made}
+
+
+def _or_null(entry, by_pattern):
+    """The schema of an entry by name that null leaves out."""
+    if by_pattern:
+        return {pattern: _or_null(each, False) for pattern, each in entry.items()}
+    return {"anyOf": [entry, {"type": "null"}]}
 
 
 def derived_case(params, design):

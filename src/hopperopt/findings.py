@@ -101,24 +101,28 @@ def _insert(setup):
     if geometry.crosses_itself(profile):
         yield _no(key, "crossing", 0, "a profile that crosses or touches itself", "a simple line")
         return
+    thickness, least = setup.insert.cone_in_cone.thickness_mm, 2 * MAX_OVERLAP * coarse / 2 * MM
+    if setup.insert.shape == "cone_in_cone" and thickness < least:
+        allowed = f"at least {least:g} mm (spheres on either side of a thinner sheet may feel each other)"
+        yield _no(f"{key}.thickness_mm", "sheet", -thickness, f"{thickness:g}", allowed)
     if (inner := geometry.inner_radius(profile)) < coarse / 2:
         value = f"a face that looks inwards on a circle of radius {inner * MM:.3g} mm"
         yield _no(key, "hollow", -inner, value, f"no smaller than the largest sphere, {coarse / 2 * MM:g} mm")
-    gap = _gap(setup)
+    elif 0 < (width := 2 * geometry.opening_radius(profile)) < SMALLEST_GAP * coarse:
+        value = f"an opening of {width * MM:.3g} mm through the insert"
+        yield _no(key, "opening", -width, value, _passage(coarse))
+    gap = setup.wall_gap
     if gap < SMALLEST_GAP * coarse:
         value = "an insert that touches the wall or lies beyond it"
         if gap > 0:
             value = f"a gap of {gap * MM:.3g} mm between insert and wall"
-        least = f"a gap of at least {SMALLEST_GAP * coarse * MM:g} mm ({SMALLEST_GAP} coarse diameters)"
-        least += _unit(setup.insert.height_mm, coarse * MM, setup.filling.level_mm)
-        yield _no("insert", "gap", -gap, value, least)
+        allowed = f"a gap of {_passage(coarse)}"
+        allowed += _unit(setup.insert.height_mm, coarse * MM, setup.filling.level_mm)
+        yield _no("insert", "gap", -gap, value, allowed)
 
 
-def _gap(setup):
-    """Gap between insert and hopper (m), 0 for an insert that is not inside."""
-    vessel = setup.hopper.profile(setup.column_bottom)
-    inside = geometry.stays_inside(setup.insert_profile, vessel)
-    return geometry.gap(setup.insert_profile, vessel) if inside else 0.0
+def _passage(coarse):
+    return f"at least {SMALLEST_GAP * coarse * MM:g} mm ({SMALLEST_GAP} coarse diameters)"
 
 
 def unusual(setup):
@@ -139,26 +143,42 @@ def unusual(setup):
         text += _unit(depth * MM, coarse / 2 * MM, MM)
         yield Finding("discharge.sensor_mm", "sensor", -depth, text)
     share = setup.time_step / setup.particles.rayleigh_time
-    if share > USUAL_STEP and not _tested(setup, share):
+    if share > USUAL_STEP and not tested(setup, share):
         text = f"{share:.2f} Rayleigh times{{where}}: an impact may gain energy; usual: at most {USUAL_STEP}"
         yield Finding("simulation.time_step_s", "step", share, text)
     yield from _hard_impacts(setup)
     profile = setup.insert_profile
     if profile is None:
         return
-    if (gap := _gap(setup)) < USUAL_GAP * coarse:
+    if (gap := setup.wall_gap) < USUAL_GAP * coarse:
         text = (
             f"a gap to the wall of {gap / coarse:.2f} coarse diameters{{where}}; usual: {USUAL_GAP} or more"
         )
         yield Finding("insert", "gap", -gap, text)
+    if 0 < (width := 2 * geometry.opening_radius(profile)) < least * coarse:
+        text = f"an opening through it of {width / coarse:.3g} coarse diameters{{where}} may jam"
+        yield Finding(f"insert.{setup.insert.shape}", "opening", -width, f"{text}; usual: {least} or more")
     if (width := float(profile[:, 0].max())) < coarse / 2:
         text = f"its radius, {width * MM:.3g} mm{{where}}, is less than a coarse sphere's"
         text += _unit(width * MM, coarse / 2 * MM, setup.hopper.cylinder_radius_mm)
         yield Finding(f"insert.{setup.insert.shape}", "thin", -width, text)
     apex, level = float(profile[:, 1].max()) * MM, setup.filling.level_mm
     if apex > level:
-        text = f"the apex, at {apex:.3g} mm, stands above the bed's surface, at {level:g} mm{{where}}"
+        text = f"its top, at {apex:.3g} mm, stands above the bed's surface, at {level:g} mm{{where}}"
         yield Finding("insert", "apex", apex - level, text)
+    yield from _resting(setup, profile)
+
+
+def _resting(setup, profile):
+    """An upper face so flat that rolling friction holds particles on it, for ever."""
+    friction = 0 if setup.contact.rolling == "none" else setup.contact.wall.rolling_friction
+    slope, least = geometry.shallowest_upper_face(profile), math.degrees(math.atan(friction))
+    if slope < least:
+        text = (
+            f"an upper face of {slope:.3g} degrees{{where}}: particles rest on it; "
+            f"usual: more than {least:.3g} (the angle of the wall's rolling friction)"
+        )
+        yield Finding(f"insert.{setup.insert.shape}", "flat", -slope, text)
 
 
 def _hard_impacts(setup):
@@ -205,7 +225,7 @@ def _fall_speed(setup):
     return math.sqrt(start**2 + 2 * setup.simulation.gravity_m_s2 * cases.column_top(setup))
 
 
-def _tested(setup, share):
+def tested(setup, share):
     contacts = (setup.contact.particle, setup.contact.wall)
     return share <= TESTED["step"] and all(
         contact.restitution <= TESTED["restitution"] and contact.static_friction <= TESTED["static_friction"]

@@ -34,6 +34,37 @@ def cone(slope, length):
     return _profile([[0, 0], [base, 0], [0, height]])
 
 
+def double_cone(lower_slope, upper_slope, length):
+    """Two solid cones base to base, the lower apex at z = 0; length along the upper one's slope."""
+    base, height = length * np.cos(np.radians(upper_slope)), length * np.sin(np.radians(upper_slope))
+    waist = base * np.tan(np.radians(lower_slope))
+    return _profile([[0, 0], [base, waist], [0, waist + height]])
+
+
+def bullet(radius, cylinder_length, nose_slope):
+    """Solid cylinder, base at z = 0, below a conical nose; its slope angle from the horizontal."""
+    shoulder = [radius, cylinder_length]
+    return _profile(
+        [[0, 0], [radius, 0], shoulder, [0, cylinder_length + radius * np.tan(np.radians(nose_slope))]]
+    )
+
+
+def cone_in_cone(slope, length, opening_radius, thickness):
+    """Hollow cone, open at top and bottom, its narrow end at z = 0 with a circle of `opening_radius` inside.
+
+    Slope angle from the horizontal and length along the slope are those of the inner face, the thickness is
+    measured across the sheet. The upper rim falls outwards at 45 degrees, so that no particle rests on it.
+    """
+    tangent = np.tan(np.radians(slope))
+    top = length * np.sin(np.radians(slope))
+    across = thickness / np.sin(np.radians(slope))
+    rim = top - across / (1 + 1 / tangent)
+    inner, outer = opening_radius, opening_radius + across
+    return _profile(
+        [[inner, 0], [outer, 0], [outer + rim / tangent, rim], [inner + top / tangent, top], [inner, 0]]
+    )
+
+
 def raised(profile, height):
     """The same profile lifted by `height`."""
     return _profile(np.asarray(profile, float) + np.array([0, height]))
@@ -76,16 +107,24 @@ def gap(first, second):
     """
     if _crossings(first, second).any():
         return 0.0
-    return float(min(_vertex_distance(first, second), _vertex_distance(second, first)))
+    return float(np.linalg.norm(np.subtract(*closest(first, second))))
 
 
-def _vertex_distance(points, profile):
-    """Least distance of any of `points` (n, 2) to the segments of `profile` (m)."""
+def closest(first, second):
+    """The closest points (2, 2) of two profiles that do not cross, one of each."""
+    pairs = _closest_to_vertices(first, second), _closest_to_vertices(second, first)[::-1]
+    return min(pairs, key=lambda pair: np.linalg.norm(np.subtract(*pair)))
+
+
+def _closest_to_vertices(points, profile):
+    """That of `points` (n, 2) which is closest to the segments of `profile`, and the point there: (2, 2)."""
     start, along = profile[:-1], np.diff(profile, axis=0)
     offset = points[:, None] - start
     squared = np.maximum(np.sum(along**2, axis=1), np.finfo(float).tiny)
     share = np.clip(np.sum(offset * along, axis=2) / squared, 0, 1)
-    return np.min(np.linalg.norm(offset - share[..., None] * along, axis=2))
+    away = offset - share[..., None] * along
+    vertex, segment = np.unravel_index(np.linalg.norm(away, axis=2).argmin(), share.shape)
+    return np.array([points[vertex], points[vertex] - away[vertex, segment]])
 
 
 def _cross(a, b):
@@ -150,6 +189,24 @@ def inner_radius(profile):
     return float(np.min(np.minimum(r1, r2), where=towards_axis, initial=np.inf))
 
 
+def shallowest_upper_face(profile):
+    """Smallest slope (degrees, from the horizontal) of a face that looks upwards, infinity where none does.
+
+    A shell shows both of its faces, a solid the outer one.
+    """
+    along, rise = np.abs(np.diff(profile[:, 0])), np.abs(np.diff(profile[:, 1]))
+    upwards = along > 0
+    if is_solid(profile):
+        upwards = np.sign(_swept(profile, -np.inf, np.inf)) * np.diff(profile[:, 0]) < 0
+    slopes = np.degrees(np.arctan2(rise, along))
+    return float(np.min(slopes, where=upwards, initial=np.inf))
+
+
+def opening_radius(profile):
+    """Radius (m) of the opening that a ring or an open shell leaves around the axis, 0 for a body on it."""
+    return float(profile[:, 0].min())
+
+
 def stays_inside(profile, vessel):
     """True when no vertex of an insert lies at or beyond the vessel's wall, or at or below its outlet."""
     wall = np.interp(profile[:, 1], vessel[:, 1], vessel[:, 0])
@@ -158,6 +215,10 @@ def stays_inside(profile, vessel):
 
 def particle_count(solid_fraction, volume, diameters):
     """Number of particles that fill `volume` (m3), equal numbers of each of the `diameters` (m)."""
-    sphere = np.pi / 6 * np.mean(np.asarray(diameters) ** 3)
     kinds = len(diameters)
-    return kinds * max(1, round(solid_fraction * volume / sphere / kinds))
+    return kinds * max(1, round(solid_fraction * volume / mean_sphere(diameters) / kinds))
+
+
+def mean_sphere(diameters):
+    """Mean volume (m3) of spheres, equal numbers of each of the `diameters` (m)."""
+    return float(np.pi / 6 * np.mean(np.asarray(diameters) ** 3))

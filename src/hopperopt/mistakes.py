@@ -55,7 +55,8 @@ def _unknown(key, value, model, path):
     known = list(_fields(_annotation(model, path[:-1])))
     near = _nearest(path, model)
     if not near:
-        everywhere = {name.rpartition(".")[2]: name for name in _all_keys(model)}
+        # The first of several keys of one name.
+        everywhere = {name.rpartition(".")[2]: name for name in reversed(list(_all_keys(model)))}
         near = [
             everywhere[name] for name in difflib.get_close_matches(str(path[-1]), everywhere, n=1, cutoff=0.8)
         ]

@@ -98,8 +98,8 @@ def test_unknown_key_is_named_with_its_value_and_the_nearest(key, value, said):
         ("wall.poisson_ratio", 0.6, "a number at least 0 and at most 0.5"),
         ("contact.particle.restitution", 1.1, "a number at least 0 and at most 1"),
         ("contact.rolling", "EDEM", "edem, cdt or none"),
-        ("insert.shape", "cube", "cone, profile or none"),
-        ("insert.shape", None, "cone, profile or none"),
+        ("insert.shape", "cube", "cone, double_cone, bullet, cone_in_cone, profile or none"),
+        ("insert.shape", None, "cone, double_cone, bullet, cone_in_cone, profile or none"),
         ("discharge.sensor_mm", 12, "a number at least -100000 and below 0"),
         ("insert.height_mm", 1e300, "a number at least 0.001 and at most 100000"),
         ("simulation.time_step_s", "automatic", "a number above 0 or auto"),
@@ -135,7 +135,7 @@ def test_unknown_key_is_named_with_its_value_and_the_nearest(key, value, said):
         ("wall.shear_modulus_pa", 22, "at least 1000"),  # MPa
         ("hopper.outlet_radius_mm", datetime.date(2024, 1, 1), "a number"),
         ("results_dir", 5, "text"),
-        ("insert", None, "the keys shape, height_mm, cone, profile"),
+        ("insert", None, "the keys shape, height_mm, cone, double_cone, bullet, cone_in_cone, profile"),
         ("insert.cone", 55, "the keys slope_deg, length_mm"),
         ("factors.theta_deg", 55, "the keys key, levels"),
         ("factors", ["theta_deg"], "keys with their values"),
@@ -348,7 +348,7 @@ def test_insert_that_blocks_is_refused_and_a_narrow_gap_is_a_warning():
 
 
 def test_apex_above_the_bed_is_only_a_warning():
-    (line,) = [line for line in config.parse({}).warnings() if "apex" in line]
+    (line,) = [line for line in config.parse({}).warnings() if "its top" in line]
     assert "77.3 mm" in line and "exp_01" in line and "and 1 more" in line
 
 

@@ -60,11 +60,11 @@ def draw(run: xr.Dataset) -> Figure:
             panel.set_title(f"{side}, {moment}", loc="left")
     _finish_axes(axes, limits)
     for panel in axes[0]:
-        panel.plot(*_mirrored(walls["gate"]), color=WALL, linewidth=1.2, zorder=3)
+        panel.plot(*mirrored(walls["gate"]), color=WALL, linewidth=1.2, zorder=3)
     for panel in axes[1]:
         outlet = walls["gate"][:, 0].max()
         panel.plot([-outlet, outlet], [sensor, sensor], color=WALL, linewidth=0.7, linestyle=":", zorder=3)
-    _draw_dimensions(axes[0, 0], walls, limits)
+    draw_dimensions(axes[0, 0], walls, limits)
     draw_key(figure, case, scale)
     return figure
 
@@ -94,7 +94,7 @@ def limits_of(run: xr.Dataset, case: Mapping) -> tuple[float, float, float, floa
     return -widest, widest, PER_M * case["discharge"]["sensor"] - 2 * MARGIN, top + 3 * MARGIN
 
 
-def _mirrored(profile):
+def mirrored(profile):
     """A profile and its mirror image as one line, from the axis outwards on either side."""
     r, z = profile.T
     return np.concatenate([-r[::-1], r]), np.concatenate([z[::-1], z])
@@ -103,7 +103,7 @@ def _mirrored(profile):
 def draw_walls(axes: Axes, walls: Mapping) -> None:
     """Draw where the cut meets hopper and insert."""
     axes.add_patch(
-        Polygon(np.column_stack(_mirrored(walls["hopper"])), facecolor=INSIDE, edgecolor="none", zorder=0)
+        Polygon(np.column_stack(mirrored(walls["hopper"])), facecolor=INSIDE, edgecolor="none", zorder=0)
     )
     sides = np.array([[-1, 1], [1, 1]])
     for side in sides:
@@ -113,7 +113,7 @@ def draw_walls(axes: Axes, walls: Mapping) -> None:
     profile = walls["insert"]
     if is_solid(profile):
         closed = np.array_equal(profile[0], profile[-1])
-        sections = [profile * side for side in sides] if closed else [np.column_stack(_mirrored(profile))]
+        sections = [profile * side for side in sides] if closed else [np.column_stack(mirrored(profile))]
         for section in sections:
             axes.add_patch(Polygon(section, facecolor=SECTION, edgecolor="none", zorder=3))
     for side in sides:
@@ -157,18 +157,18 @@ def _finish_axes(axes, limits):
         panel.yaxis.set_major_locator(MaxNLocator(6))
 
 
-def _draw_dimensions(axes: Axes, walls: Mapping, limits: Sequence[float]) -> None:
+def draw_dimensions(axes: Axes, walls: Mapping, limits: Sequence[float]) -> None:
     """Draw the diameters of outlet and cylinder and the height of the insert (mm)."""
     outlet, widest = walls["gate"][:, 0].max(), walls["hopper"][:, 0].max()
     above, below = limits[3] - 2 * MARGIN, -1.5 * MARGIN
-    _dimension(axes, (-widest, above), (widest, above), f"⌀ {2 * widest:.3g} mm", (0, 1), "bottom")
-    _dimension(axes, (-outlet, below), (outlet, below), f"⌀ {2 * outlet:.3g} mm", (0, -1), "top")
+    dimension(axes, (-widest, above), (widest, above), f"⌀ {2 * widest:.3g} mm", (0, 1), "bottom")
+    dimension(axes, (-outlet, below), (outlet, below), f"⌀ {2 * outlet:.3g} mm", (0, -1), "top")
     if "insert" in walls:
-        height = walls["insert"][:, 1].min()
-        _dimension(axes, (0, 0), (0, height), f"{height:.3g} mm", (2, 0), "center")
+        r, height = walls["insert"][walls["insert"][:, 1].argmin()]
+        dimension(axes, (-r, 0), (-r, height), f"{height:.3g} mm", (2, 0), "center")
 
 
-def _dimension(axes, start, end, text, offset, align):
+def dimension(axes, start, end, text, offset, align):
     """Draw a line with arrow heads at both ends, and its length beside the middle."""
     arrow = {"arrowstyle": "<|-|>,head_length=0.3,head_width=0.12", "color": style.INK, "linewidth": 0.6}
     line = axes.annotate("", end, start, zorder=6, arrowprops={**arrow, "shrinkA": 0, "shrinkB": 0})
@@ -178,7 +178,7 @@ def _dimension(axes, start, end, text, offset, align):
         ((start[0] + end[0]) / 2, (start[1] + end[1]) / 2),
         offset,
         textcoords="offset points",
-        ha="left" if offset[0] else "center",
+        ha={1: "left", 0: "center", -1: "right"}[np.sign(offset[0])],
         va=align,
         zorder=6,
         path_effects=style.HALO,

@@ -15,7 +15,7 @@ PANEL = (29.0, 23.0)  # mm
 FRAME = style.Frame(left=11, right=7, bottom=8.5, top=9)
 GAPS = (3.0, 6.0)
 KEY = 4.0  # mm, height of the key's row
-MOST_FACTORS, LONGEST_NAME = 3, 4  # what fits above a panel
+MOST_FACTORS, LONGEST_NAME = 4, 4  # what fits above a panel
 
 
 def grid(data: xr.Dataset, key: Mapping[str, Mapping] | None = None) -> tuple[Figure, list[Axes]]:
@@ -51,9 +51,10 @@ def _label(figure, panels, data, frame):
     names = [re.sub(r"^exp_0*(?=\d)", "", str(name)) for name in data["experiment"].values]
     if len(factors) > MOST_FACTORS or max(map(len, names)) > LONGEST_NAME:
         factors = []
+    space = " " if len(factors) == MOST_FACTORS else "  "
     for row, (name, panel) in enumerate(zip(names, panels, strict=True)):
         panel.set_title(name, loc="left", fontweight="bold")
-        panel.set_title("  ".join(f"{float(data[factor][row]):.3g}" for factor in factors), loc="right")
+        panel.set_title(space.join(f"{float(data[factor][row]):.3g}" for factor in factors), loc="right")
     width, height = style.size(figure)
     above = height - 1 - (frame.top - FRAME.top)
     style.put(figure, frame.left, above, "experiment", va="top", fontweight="bold")

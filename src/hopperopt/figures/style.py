@@ -148,11 +148,11 @@ def save(figure: Figure, outputs: Iterable[str | os.PathLike], dpi: int) -> None
 
 
 def factor_parts(name: str) -> tuple[str, str]:
-    """Symbol and unit of a factor: theta_deg gives (θ, °); a name without a known unit stays as it is."""
+    """Symbol and unit of a factor: theta_deg gives (θ, °), outlet_radius_mm (outlet radius, mm)."""
     stem, _, unit = name.rpartition("_")
     if unit not in UNITS:
-        return name, ""
-    return FACTORS.get(stem, stem), UNITS[unit]
+        return name.replace("_", " "), ""
+    return FACTORS.get(stem, stem.replace("_", " ")), UNITS[unit]
 
 
 def design_text(design: Mapping[str, float]) -> str:
