@@ -6,6 +6,7 @@
 # make test-all            the tests with the full counts: hours
 # make validation         the solver against closed forms and other codes: rewrites docs/validation.md; CASE=name for one
 # make archive             configuration, lock, data, tables and figures of the study as one zip file
+# make reference           config/config.schema.json and docs/configuration.md anew, from the models in config.py
 # make lock                the newest versions of all libraries into requirements.lock
 # make PYTHON=python3.12   another Python for the environment;   make CORES=4   fewer cores for the study
 
@@ -27,7 +28,7 @@ endef
 # Tests of one file share what they set up, so a process takes whole files.
 pytest = .venv/bin/python -m pytest --numprocesses logical --maxprocesses 8 --dist loadfile
 
-.PHONY: study resume setup cluster test test-all lint validation archive lock
+.PHONY: study resume setup cluster test test-all lint validation archive reference lock
 study: setup
 	$(lock_study); exec $(snakemake) --cores $(CORES)
 
@@ -53,6 +54,9 @@ validation: setup
 
 archive: setup
 	.venv/bin/python -m hopperopt archive --directory '$(STUDY)'
+
+reference: setup
+	.venv/bin/python -m hopperopt reference --output config/config.schema.json docs/configuration.md
 
 lint: setup
 	.venv/bin/ruff check .

@@ -1,4 +1,4 @@
-"""Commands for people beside the workflow: how far a study is, its archive, pictures of a run."""
+"""Commands for people beside the workflow: what a study will be, how far it is, its archive, pictures."""
 
 import argparse
 import logging
@@ -12,9 +12,11 @@ from pathlib import Path
 def add(commands, figures: Sequence[str]) -> None:
     """Add the commands to the subparsers; figures: paths of all figures, below the folder of results."""
     for function, name, text in (
+        (_add_check, "check", "say what a study will be, before anything runs"),
         (_add_status, "status", "show how far a study is"),
         (_add_render, "render", "draw a simulation as a movie, stills, or files for ParaView"),
         (_add_archive, "archive", "put a study into one zip file"),
+        (_add_reference, "reference", "write the configuration's schema and page of keys"),
     ):
         command = commands.add_parser(name, help=text)
         command.set_defaults(figures=figures)
@@ -48,6 +50,29 @@ def _study(given: argparse.Namespace):
     paths = given.configfile or [given.directory / "config.yaml"]
     document = config.load(paths)
     return config.parse(document, given.directory), document, paths
+
+
+def _add_check(command: argparse.ArgumentParser) -> None:
+    command.description = (
+        "Say what a study will be: its simulations, particles, gaps, time step, expected time and memory; "
+        "draw the hopper with the extreme inserts. Nothing is simulated."
+    )
+    _add_study(command)
+    command.add_argument(
+        "--output", type=Path, default=Path("check.png"), metavar="FILE", help="drawing to write, PNG or PDF"
+    )
+    command.set_defaults(action=_check)
+
+
+def _check(given: argparse.Namespace) -> None:
+    """Print a study's table and draw its extremes."""
+    study, *_ = _study(given)
+    from hopperopt import files, preview
+
+    files.check_writable(given.output)
+    print("\n".join(preview.table(study, given.directory.resolve())))
+    preview.draw(study, given.output)
+    print(f"{'drawing':<20}{given.output}")
 
 
 def _add_status(command: argparse.ArgumentParser) -> None:
@@ -101,6 +126,19 @@ def _archive(given: argparse.Namespace) -> None:
     if missing := [path for path in expected if f"{archive.RESULTS}/{path}" not in held]:
         logging.warning(f"not in it, as they are not there: {', '.join(missing)}")
     print(f"{output}: {len(held)} files, {output.stat().st_size / 1e6:.1f} MB")
+
+
+def _add_reference(command: argparse.ArgumentParser) -> None:
+    command.description = "Write the configuration's JSON schema and the page of its keys, from its models."
+    command.add_argument("--output", nargs=2, type=Path, required=True, metavar=("SCHEMA.json", "PAGE.md"))
+    command.set_defaults(action=_write_reference)
+
+
+def _write_reference(given: argparse.Namespace) -> None:
+    from hopperopt import reference
+
+    for path, text in zip(given.output, (reference.schema(), reference.page()), strict=True):
+        path.write_text(text, encoding="utf-8")
 
 
 def _add_render(command: argparse.ArgumentParser) -> None:

@@ -341,8 +341,8 @@ class Simulation(Model):
     checkpoint_minutes: Annotated[float | None, Number(above=0, most=100_000)] = 5.0
     """How often a running simulation saves its state, to go on from when interrupted; null is never."""
     snapshot_interval_s: Annotated[float | None, Number(least=0.01, most=10_000)] = None
-    """Interval of the positions and speeds that a run's file keeps for movies; null keeps none. At 0.02 s they
-    take some 20 MB a run."""
+    """Interval of the positions and speeds that a run's file keeps for movies; null keeps none. At 0.02 s
+    they take some 20 MB a run."""
 
 
 class Setup(Model):

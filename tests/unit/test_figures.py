@@ -13,11 +13,12 @@ import xarray as xr
 from matplotlib.colors import to_rgb
 from matplotlib.text import Text
 
-from hopperopt import cli, dataset, outflow
+from hopperopt import cli, config, dataset, outflow, preview, provenance
 from hopperopt.figures import (
     curves,
     effects,
     errors,
+    extremes,
     fit,
     front,
     hopper,
@@ -53,9 +54,8 @@ def make_plan(make_run):
     def plan(experiments=25, replicates=1, factors=3, count=400, dropped=(), name="exp_{:02d}"):
         rng = np.random.default_rng(3)
         names = [name.format(n) for n in range(1, experiments + 1)]
-        columns = dict(
-            itertools.islice((FACTORS | dict.fromkeys(("friction", "b", "c"), (0, 1))).items(), factors)
-        )
+        known = FACTORS | {"outlet_radius_mm": (20.0, 25.0), "b": (0, 1), "c": (0, 1)}
+        columns = dict(itertools.islice(known.items(), factors))
         values = {name: rng.uniform(*limits, experiments).round(2) for name, limits in columns.items()}
         runs = {
             (name, r): make_run(count, seed=100 * n + r)
@@ -190,6 +190,7 @@ def check_texts(figure):
     [
         {},
         {"experiments": 1, "count": 100},
+        {"factors": 4},
         {"experiments": 7, "replicates": 2, "factors": 6},
         {"experiments": 12, "dropped": [("exp_04", 1)]},
         {"experiments": 5, "name": "long_name_{}"},
@@ -358,6 +359,33 @@ def test_hopper_can_be_read(run):
     assert any("never" in text.get_text() for text, _ in written(hopper.draw(never)))
 
 
+@pytest.mark.parametrize("name", ["fourth_factor", "bullet", "double_cone", "cone_in_cone", "profile"])
+def test_extremes_can_be_read(name):
+    root = provenance.PACKAGE.parents[1]
+    files = [root / "config.yaml", root / f"config/examples/{name}.yaml"]
+    figure = extremes.draw(preview.sketches(config.parse(config.load(files), root)))
+    check_texts(figure)
+    words = " ".join(text.get_text() for text, _ in written(figure))
+    assert "smallest gap" in words and "level of the bed, 74 mm" in words
+
+
+def test_extremes_of_a_bare_hopper_are_one(run):
+    study = config.parse(
+        {
+            "insert": {"shape": "none"},
+            "factors": {
+                "height_mm": None,
+                "length_mm": None,
+                "theta_deg": None,
+                "outlet_radius_mm": {"key": "hopper.outlet_radius_mm", "levels": [20, 21, 22, 23, 24]},
+            },
+        }
+    )
+    figure = extremes.draw(preview.sketches(study))
+    check_texts(figure)
+    assert len(figure.axes) == 1
+
+
 def test_hopper_shows_the_particles_behind_the_cut_at_their_place(run):
     pair = run.isel(particle=[0, 2])
     pair["position_opening"][:] = [[0.03, 0.01, 0.05], [-0.03, -0.01, 0.05]]
@@ -395,8 +423,9 @@ def test_labels_move_apart_in_their_order_and_no_farther_than_needed():
 
 
 def test_designs_in_words():
-    design = {"height_mm": 33.0, "friction": 0.5, "theta_deg": 56.71}
-    assert style.design_text(design) == r"$\theta$ = 56.7°, $H$ = 33 mm, friction = 0.5"
+    design = {"height_mm": 33.0, "outlet_radius_mm": 21.25, "wall_friction": 0.5, "theta_deg": 56.71}
+    words = r"$\theta$ = 56.7°, $H$ = 33 mm, outlet radius = 21.2 mm, wall friction = 0.5"
+    assert style.design_text(design) == words
 
 
 def test_files_are_the_same_every_time(tmp_path):
