@@ -1,8 +1,8 @@
 """What a simulation costs, estimated from its case before it runs: time steps, time and memory.
 
 The simulated times are fitted to runs of two hoppers, the study's (15,000 particles) and the reduced one's
-(3,100), with and without inserts, which hardly matter: steps come out within 10 % of those runs. Speeds and
-memory were measured on one core; see benchmarks/README.md.
+(3,100), with and without inserts, which hardly matter: steps come out within 10 %, particle-steps within 15 %
+of single runs. Speeds and memory were measured on one core; see benchmarks/README.md.
 """
 
 import math
@@ -19,7 +19,7 @@ BED = 0.55  # solid fraction of a bed at rest
 IN_DISCHARGE = 0.5  # of the particles, the mean number that is left while the hopper empties
 SPEEDS = 11e6, 5e6  # particle-steps per second: one core of a fast machine, of a slow or busy one
 START = 4.0  # s, Python and its libraries
-MEMORY = 250.0, 0.0013  # MB: the program, and each particle
+MEMORY = 250.0, 0.0013  # MB: the program (200 more where it compiles), and each particle
 GRANTED = 4  # times what a simulation takes on a slow machine, for those that flow for longer
 
 
