@@ -20,6 +20,7 @@ IN_DISCHARGE = 0.5  # of the particles, the mean number that is left while the h
 SPEEDS = 11e6, 5e6  # particle-steps per second: one core of a fast machine, of a slow or busy one
 START = 4.0  # s, Python and its libraries
 MEMORY = 250.0, 0.0013  # MB: the program (200 more where it compiles), and each particle
+SNAPSHOT = 4e-5  # MB for each particle of a snapshot
 GRANTED = 4  # times what a simulation takes on a slow machine, for those that flow for longer
 
 
@@ -37,13 +38,15 @@ class Cost(NamedTuple):
         return tuple(START + self.particle_steps / speed for speed in SPEEDS)
 
 
-def expected(case: Mapping) -> Cost:
-    """Cost of a case (see `case.simulation`)."""
+def expected(case: Mapping, snapshot_interval: float | None = None) -> Cost:
+    """Cost of a case (see `case.simulation`), with memory for snapshots (interval in s) up to its limit."""
     particles = sum(case["particles"]["counts"])
     filling, discharge = _filling_time(case, particles), _discharge_time(case)
     steps = (filling + discharge) / case["time_step"]
     worked = particles * (filling + IN_DISCHARGE * discharge) / case["time_step"]
     program, each = MEMORY
+    if snapshot_interval is not None:
+        each += SNAPSHOT * case["discharge"]["time_limit"] / snapshot_interval
     return Cost(particles, steps, worked, program + each * particles)
 
 

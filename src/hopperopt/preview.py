@@ -109,7 +109,8 @@ def _time_step(designs):
 def _cost(study, designs):
     """Expected time and memory; verification runs of designs yet to be found cost the plan's mean."""
     plan = len(study.plan)
-    costs = [cost.expected(setup.case(labels, 0)) for _, labels, setup in designs.known]
+    interval = study.simulation.snapshot_interval_s
+    costs = [cost.expected(setup.case(labels, 0), interval) for _, labels, setup in designs.known]
     of_name = {name: each for (name, *_), each in zip(designs.known, costs, strict=True)}
     mean = np.mean([each.seconds for each in costs[:plan]], axis=0)
     total = plan * study.design.replicates * mean

@@ -43,6 +43,12 @@ def test_no_flow_is_told_to_last_until_the_limit():
     assert cost.expected(blocked).steps == pytest.approx(10 / 4e-5, rel=0.1)
 
 
+def test_snapshots_take_memory_up_to_the_time_limit():
+    """Five hundred of 15,000 particles, 40 bytes for each."""
+    plain, filmed = (cost.expected(case("exp_08"), interval) for interval in (None, 0.02))
+    assert filmed.memory_mb - plain.memory_mb == pytest.approx(500 * plain.particles * 4e-5)
+
+
 def test_granted_is_enough_for_the_dearest_on_a_slow_machine():
     costs = [cost.expected(case(name)) for name in ("exp_08", None)]
     granted = cost.granted(costs)

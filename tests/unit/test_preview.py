@@ -51,7 +51,7 @@ def test_table_follows_the_configuration():
 def test_expected_time_is_that_of_all_simulations(monkeypatch):
     """With every simulation of one cost: their number times that, over the cores."""
     same = cost.Cost(15000, 36000, 3.3e8, 270)
-    monkeypatch.setattr(cost, "expected", lambda case: same)
+    monkeypatch.setattr(cost, "expected", lambda *_: same)
     monkeypatch.setattr(preview.os, "sched_getaffinity", lambda process: range(3), raising=False)
     monkeypatch.setattr(preview, "duration", lambda seconds: f"{seconds:.1f}")
     table = rows()

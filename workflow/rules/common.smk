@@ -141,23 +141,10 @@ def running(wildcards, threads):
 
 
 def simulation_resources():
-<<<<<<< HEAD
-    """Memory (MB) and time (minutes) granted to a simulation, a few times what it takes."""
-    name, design = next(iter(DESIGNS.items()))
-    case = case_of(json.dumps(design), name, 1)
-    particles = sum(case["particles"]["counts"])
-    steps = (case["filling"]["settling_limit"] + 3.0) / case["time_step"]
-    interval = STUDY.simulation.snapshot_interval_s
-    snapshots = 0 if interval is None else particles * case["discharge"]["time_limit"] / interval
-    return {
-        "mem_mb": 1000 + particles // 500 + round(4e-5 * snapshots),
-        "runtime": 10 + round(particles * steps / 2e6 / 60),
-    }
-=======
     """Memory (MB) and time (minutes) granted to a simulation, a few times what the dearest design takes."""
+    interval = STUDY.simulation.snapshot_interval_s
     cases = [case_of(json.dumps(design), name, 1) for name, design in DESIGNS.items()]
-    return cost.granted(map(cost.expected, cases))
->>>>>>> f3cf81c (check: what a study will be, before anything runs; its cost also grants the jobs' resources; schema and page of every key)
+    return cost.granted([cost.expected(case, interval) for case in cases])
 
 
 def plan_runs():
