@@ -549,8 +549,10 @@ class Optimise(Model):
 
 
 PAPERS_OPTIMUM = {"theta_deg": 56.7, "length_mm": 32.4, "height_mm": 33.0}  # the optimum of Yu and Saxén
-FIXED = ("plan_centre", "bare")
-DERIVED = ("selected", "best_f", "best_i", "plan_best")
+Derived = Literal["selected", "best_f", "best_i", "plan_best"]
+Fixed = Literal["plan_centre", "bare"]
+DERIVED: tuple[Derived, ...] = get_args(Derived)
+FIXED: tuple[Fixed, ...] = get_args(Fixed)
 
 
 def _read_case(value):
@@ -566,7 +568,7 @@ def _read_case(value):
         raise NotAllowed(allowed) from None
 
 
-Case = Annotated[Literal[*DERIVED, *FIXED] | dict[str, float], BeforeValidator(_read_case)]
+Case = Annotated[Derived | Fixed | dict[str, float], BeforeValidator(_read_case)]
 
 
 class Verification(Model):
@@ -577,7 +579,8 @@ class Verification(Model):
     replicates_of: dict[Name, Count] = {"selected": 20, "plan_best": 20}
     """Fillings of single cases that have another number, by name."""
     cases: Annotated[dict[Name, Case], Field(min_length=1, max_length=plans.MOST_EXPERIMENTS)] = {
-        **{word: word for word in (*DERIVED, "plan_centre")},
+        **{word: word for word in DERIVED},
+        "plan_centre": "plan_centre",
         "paper": PAPERS_OPTIMUM,
         "bare": "bare",
     }

@@ -35,7 +35,8 @@ class Cost(NamedTuple):
     @property
     def seconds(self) -> tuple[float, float]:
         """Time (s) on one core of a fast and of a slow machine."""
-        return tuple(START + self.particle_steps / speed for speed in SPEEDS)
+        fast, slow = (START + self.particle_steps / speed for speed in SPEEDS)
+        return fast, slow
 
 
 def expected(case: Mapping, snapshot_interval: float | None = None) -> Cost:

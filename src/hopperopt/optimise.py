@@ -81,7 +81,7 @@ def search_all(
 ) -> list[tuple[Front, list]]:
     """Run `search` with each seed, params["seeds"] of them from params["seed"] on."""
     seeds = range(params["seed"], params["seed"] + params["seeds"])
-    return [search(predictor, bounds, params | {"seed": seed}) for seed in seeds]
+    return [search(predictor, bounds, {**params, "seed": seed}) for seed in seeds]
 
 
 def merged(fronts: Sequence[Front]) -> Front:

@@ -100,9 +100,13 @@ def _allowed(entry: Mapping) -> str:
     words = [word for kind, word in zip(kinds, words, strict=True) if word or kind.get("type") == "null"]
     for kind in kinds:
         if kind.get("type") in ("number", "integer"):
-            bounds = {"above": "exclusiveMinimum", "least": "minimum", "below": "exclusiveMaximum"}
-            bounds = {name: kind.get(word) for name, word in (bounds | {"most": "maximum"}).items()}
-            return Quantity(**bounds).described(kind["type"] == "integer", words)
+            quantity = Quantity(
+                above=kind.get("exclusiveMinimum"),
+                least=kind.get("minimum"),
+                below=kind.get("exclusiveMaximum"),
+                most=kind.get("maximum"),
+            )
+            return quantity.described(kind["type"] == "integer", words)
     said = [_kind(kind) for kind in kinds if not kind.get("const") and kind.get("type") != "null"]
     return " or ".join([*said, *(word or "null" for word in words)])
 
