@@ -568,7 +568,7 @@ def _read_case(value):
         raise NotAllowed(allowed) from None
 
 
-Case = Annotated[Derived | Fixed | dict[str, float], BeforeValidator(_read_case)]
+Case = Annotated[Literal[Derived, Fixed] | dict[str, float], BeforeValidator(_read_case)]
 
 
 class Verification(Model):
