@@ -1,5 +1,6 @@
 """The configuration for editors and readers, made from its models: JSON schema, and a page of every key."""
 
+import functools
 import json
 from collections.abc import Iterator, Mapping
 
@@ -76,9 +77,14 @@ def _unit(key: str) -> str:
     return UNITS[max(fitting, key=len)] if fitting else ""
 
 
+@functools.cache
+def _defaults() -> dict:
+    return config.parse({}).document
+
+
 def _default(key: str) -> str:
     try:
-        return _shown(lookup(config.parse({}).document, key))
+        return _shown(lookup(_defaults(), key))
     except LookupError:  # below a name of one's own
         return ""
 

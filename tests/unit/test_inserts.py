@@ -1,5 +1,6 @@
 """The shapes of inserts: their profiles, what the configuration refuses of them, and the shipped examples."""
 
+import functools
 import re
 from pathlib import Path
 
@@ -19,6 +20,12 @@ def example(name, changes=()):
     """The study of a shipped example, changed in some keys."""
     shipped = config.load([ROOT / "config.yaml", ROOT / f"config/examples/{name}.yaml"])
     return config.parse(document.merge(shipped, dict(changes)), ROOT)
+
+
+@functools.cache
+def shipped_example(name):
+    """The study of a shipped example."""
+    return example(name)
 
 
 def wall_ring(inner, outer, height):
@@ -188,14 +195,14 @@ def test_narrow_opening_is_a_warning():
 
 
 def test_examples_are_one_of_each():
-    shapes = {path.stem: example(path.stem).insert.shape for path in EXAMPLES}
+    shapes = {path.stem: shipped_example(path.stem).insert.shape for path in EXAMPLES}
     assert shapes == {name: name for name in (*SHAPES, "profile")} | {"fourth_factor": "cone"}
-    assert len(example("fourth_factor").factors) == 4
+    assert len(shipped_example("fourth_factor").factors) == 4
 
 
 @pytest.mark.parametrize("name", [path.stem for path in EXAMPLES])
 def test_example_follows_its_own_factors_everywhere(name):
-    study = example(name)
+    study = shipped_example(name)
     assert study.results_dir == f"results/{name}"
     factors = list(study.factors)
     bounds = study.stage_params("optimise")["bounds"]
