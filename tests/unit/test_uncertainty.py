@@ -124,7 +124,11 @@ def test_the_plans_data_set_has_the_same_truth(runs):
     """Replicates of equal designs, gathered: U of each; the noise between replicates is that of counting."""
     count = 100
     plan = pd.DataFrame({"theta_deg": np.arange(count)}, index=[f"exp_{n:02d}" for n in range(1, count + 1)])
-    own = {(plan.index[n // RUNS], n % RUNS + 1): run for n, run in enumerate(runs["bare"][: count * RUNS])}
+    anywhere = ("particle", "xyz"), np.random.default_rng(9).random((3 * POOL, 3))
+    own = {
+        (plan.index[n // RUNS], n % RUNS + 1): run.assign(position_opening=anywhere)
+        for n, run in enumerate(runs["bare"][: count * RUNS])
+    }
     data = dataset.assemble(plan, own, {})
     for k, name in enumerate(OUTPUTS):
         of_size = data.sel(size_class=name)
