@@ -223,7 +223,14 @@ def _run_stage(given: argparse.Namespace) -> None:
 
 def _add_simulate(command: argparse.ArgumentParser) -> None:
     command.description = "Run one simulation of a design, or of the bare hopper, as the configuration says."
-    commands.add_configfile(command)
+    command.add_argument(
+        "--configfile",
+        nargs="+",
+        type=Path,
+        default=[Path("config.yaml")],
+        metavar="YAML",
+        help="the study; later files override earlier ones (default: config.yaml)",
+    )
     for option, name in SHORTHANDS.items():
         command.add_argument(f"--{option}", metavar="VALUE", help=f"short for --factor {name}=VALUE")
     command.add_argument(

@@ -23,21 +23,15 @@ def add(commands, figures: Sequence[str]) -> None:
         function(command)
 
 
-def add_configfile(command: argparse.ArgumentParser) -> None:
-    """Add the option that names the study's configuration."""
+def _add_study(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--configfile",
         nargs="+",
         type=Path,
-        default=[Path("config.yaml")],
+        default=[],
         metavar="YAML",
-        help="the study; later files override earlier ones (default: config.yaml)",
+        help="what overrides the config.yaml of the study's folder, as for snakemake",
     )
-
-
-def _add_study(command: argparse.ArgumentParser) -> None:
-    add_configfile(command)
-    command.set_defaults(configfile=None)
     command.add_argument(
         "--directory", type=Path, default=Path(), metavar="DIR", help="the study's folder (default: this one)"
     )
@@ -47,7 +41,8 @@ def _study(given: argparse.Namespace):
     """The study in a folder, its raw document and the files of that, found as Snakemake finds them."""
     from hopperopt import config
 
-    paths = given.configfile or [given.directory / "config.yaml"]
+    own = given.directory / "config.yaml"
+    paths = [*([own] if own.exists() or not given.configfile else []), *given.configfile]
     document = config.load(paths)
     return config.parse(document, given.directory), document, paths
 

@@ -33,7 +33,7 @@ def study(tmp_path, monkeypatch):
 
 
 def archive():
-    assert cli.main(["archive", "--configfile", "config.yaml", "other.yaml"]) == 0
+    assert cli.main(["archive", "--configfile", "other.yaml"]) == 0
     return zipfile.ZipFile("results.zip")
 
 
