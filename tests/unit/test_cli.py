@@ -59,9 +59,10 @@ def test_an_interrupted_simulation_leaves_its_state_to_the_next(simulated, tmp_p
     assert "0 is not allowed; allowed: a number above 0 or null" in capsys.readouterr().err
 
 
-def test_a_simulation_has_a_heartbeat_and_a_log_while_it_runs(simulated, capsys):
+def test_a_simulation_has_a_heartbeat_and_a_log_while_it_runs(simulated, capsys, monkeypatch):
+    monkeypatch.setattr(heartbeat, "INTERVAL", 0)
     simulated()
-    assert [beat.output for beat in simulated.beats] == ["../../out/run.nc"]
+    assert [(beat.output, beat.stage) for beat in simulated.beats] == [("../../out/run.nc", "filling")]
     assert "filling     0.100 s simulated,     60 particles left" in capsys.readouterr().err
     assert not Path("results/.state").exists()
 
