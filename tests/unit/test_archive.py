@@ -67,7 +67,10 @@ def test_the_same_content_gives_the_same_bytes(study):
     one = (study / "results.zip").read_bytes()
     for path in study.rglob("*.nc"):
         path.touch()
-    archive().close()
+    with archive() as again:
+        assert {entry.date_time for entry in again.infolist()} == {(1980, 1, 1, 0, 0, 0)}, (
+            "not of this moment"
+        )
     assert (study / "results.zip").read_bytes() == one
 
 
