@@ -174,8 +174,31 @@ def numba_cache_lock() -> Iterator[None]:
 
 
 def compile_solver(threads: int = 1) -> None:
-    """Compile the solver for so many threads, or load it compiled: before a process's first time step."""
-    with numba_cache_lock():
-        from hopperopt.dem.simulation import compile_solver as compile_all
+    """Compile the solver for so many threads, or load it compiled: before a process's first time step.
 
-        compile_all(threads)
+    Who compiles marks the cache at its end, so that all others load at the same time and not one by one.
+    """
+    compiled = use_numba_cache() / f"compiled-{_compiled_from(threads > 1)}"
+    if not compiled.exists():
+        with numba_cache_lock():
+            if not compiled.exists():
+                _load_solver(threads)
+                compiled.touch()
+                return
+    _load_solver(threads)
+
+
+def _compiled_from(parallel: bool) -> str:
+    """Digest of all that numba looks at before it takes compiled code from its cache."""
+    from llvmlite import binding  # slow to import
+
+    sources = [(path.name, path.stat().st_mtime_ns) for path in sorted((PACKAGE / "dem").glob("*.py"))]
+    processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    things = [str(PACKAGE), sources, sys.version, _version("numba"), processor, parallel]
+    return hashlib.sha256(json.dumps(things).encode()).hexdigest()[:20]
+
+
+def _load_solver(threads: int) -> None:
+    from hopperopt.dem.simulation import compile_solver as compile_all
+
+    compile_all(threads)

@@ -96,6 +96,14 @@ def test_only_one_process_holds_the_lock(tmp_path):
     assert (tmp_path / "log").read_text() == "[]" * 10
 
 
+def test_a_compiled_solver_is_loaded_without_the_lock():
+    """While the lock is held: hundreds of simulations that start at once do not load one by one."""
+    provenance.compile_solver()
+    with provenance.numba_cache_lock():
+        program = "from hopperopt import provenance; provenance.compile_solver()"
+        subprocess.run([sys.executable, "-c", program], check=True, timeout=300)
+
+
 def test_git_state_is_unknown_without_git(monkeypatch):
     monkeypatch.setenv("PATH", "")
     assert provenance.git_state() == "unknown"
