@@ -26,6 +26,7 @@ from hopperopt.quantity import Quantity
 
 BAD_INPUT = 2
 MOST_SEED = 2**63 - 1
+STDIN = "-"  # stands for what is longer than the arguments of a command may be
 SHORTHANDS = {"theta": "theta_deg", "length": "length_mm", "height": "height_mm"}
 
 
@@ -172,9 +173,11 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_stage(command: argparse.ArgumentParser, stage: Stage) -> None:
-    command.add_argument("--params", type=_json, required=True, metavar="JSON", help="configuration")
+    command.add_argument(
+        "--params", type=_json, required=True, metavar="JSON", help="configuration; - reads it from stdin"
+    )
     for option in stage.inputs:
-        count = {"nargs": "*"} if option.endswith("*") else {}
+        count = {"nargs": "*", "help": "- reads their paths from stdin"} if option.endswith("*") else {}
         command.add_argument(f"--{option.rstrip('*')}", required=True, metavar="FILE", **count)
     command.add_argument("--output", required=True, nargs=len(stage.outputs), metavar=stage.outputs)
     command.set_defaults(action=_run_stage, stage=stage)
@@ -182,7 +185,7 @@ def _add_stage(command: argparse.ArgumentParser, stage: Stage) -> None:
 
 def _json(text: str) -> dict:
     try:
-        return json.loads(text)
+        return json.loads(sys.stdin.read() if text == STDIN else text)
     except json.JSONDecodeError as error:
         raise argparse.ArgumentTypeError(f"no JSON: {error}") from None
 
@@ -212,6 +215,7 @@ def _run_stage(given: argparse.Namespace) -> None:
     """Call the stage's function with its parameters, inputs and outputs."""
     _log_heading(given.params)
     inputs = [getattr(given, option.rstrip("*")) for option in given.stage.inputs]
+    inputs = [sys.stdin.read().splitlines() if paths == [STDIN] else paths for paths in inputs]
     from hopperopt import files
 
     module = importlib.import_module(f"hopperopt.{given.stage.module}")

@@ -553,6 +553,7 @@ Derived = Literal["selected", "best_f", "best_i", "plan_best"]
 Fixed = Literal["plan_centre", "bare"]
 DERIVED: tuple[Derived, ...] = get_args(Derived)
 FIXED: tuple[Fixed, ...] = get_args(Fixed)
+MOST_CASES = 1000  # `verify` gets them in one argument, whose length the system limits
 
 
 def _read_case(value):
@@ -578,7 +579,7 @@ class Verification(Model):
     """Fillings of each case."""
     replicates_of: dict[Name, Count] = {"selected": 20, "plan_best": 20}
     """Fillings of single cases that have another number, by name."""
-    cases: Annotated[dict[Name, Case], Field(min_length=1, max_length=plans.MOST_EXPERIMENTS)] = {
+    cases: Annotated[dict[Name, Case], Field(min_length=1, max_length=MOST_CASES)] = {
         **{word: word for word in DERIVED},
         "plan_centre": "plan_centre",
         "paper": PAPERS_OPTIMUM,

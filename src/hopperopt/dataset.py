@@ -54,9 +54,10 @@ def gather(
     is left).
     """
     simulated = read_runs(simulations)
-    if missed := missed_levels(simulated):
+    ends = {key: run.drop_dims(run.dims) for key, run in simulated.items()}  # without the particles
+    if missed := missed_levels(ends):
         logging.warning(missed)
-    unusable = unusable_runs(simulated)
+    unusable = unusable_runs(ends)
     if unusable and params["incomplete"] != "drop":
         raise files.InputError(refusal(unusable))
     plan = files.read_table(design, "experiment", *params["factors"])
@@ -67,21 +68,38 @@ def gather(
     files.write_table(ranked_designs(dataset), designs)
 
 
-def read_runs(paths: Iterable) -> dict[tuple[str, int], xr.Dataset]:
-    """Read runs by (name, replicate), both from the file's name NAME_rep_REPLICATE.nc.
+class RunFiles(Mapping):
+    """Runs by (name, replicate) as datasets; each is read when it is asked for, and none is kept."""
 
-    Raises files.InputError naming a file that is damaged or holds no run.
+    def __init__(self, paths: Mapping[tuple[str, int], Path]):
+        self._paths = paths
+
+    def __getitem__(self, key):
+        path = self._paths[key]
+        run = files.read_netcdf(path)
+        if missing := RUN - set(run.data_vars):
+            raise files.InputError(f"{path}: is no run of a simulation: no {', '.join(sorted(missing))}")
+        return run.drop_dims("snapshot", errors="ignore")  # snapshots are large
+
+    def __iter__(self):
+        return iter(self._paths)
+
+    def __len__(self):
+        return len(self._paths)
+
+
+def read_runs(paths: Iterable) -> RunFiles:
+    """Runs by (name, replicate), both from the file's name NAME_rep_REPLICATE.nc; files.InputError else.
+
+    A file that is damaged or holds no run raises files.InputError, naming it, when its run is asked for.
     """
-    runs = {}
+    found = {}
     for path in map(Path, paths):
         match = re.fullmatch(r"(.+)_rep_(\d+)\.nc", path.name)
         if match is None:
             raise files.InputError(f"{path}: a run's file is named NAME_rep_REPLICATE.nc")
-        run = files.read_netcdf(path)
-        if missing := RUN - set(run.data_vars):
-            raise files.InputError(f"{path}: is no run of a simulation: no {', '.join(sorted(missing))}")
-        runs[match[1], int(match[2])] = run.drop_dims("snapshot", errors="ignore")  # snapshots are large
-    return runs
+        found[match[1], int(match[2])] = path
+    return RunFiles(found)
 
 
 def unusable_runs(runs: Mapping[tuple[str, int], xr.Dataset]) -> dict[tuple[str, int], str]:
@@ -141,27 +159,33 @@ def assemble(plan: pd.DataFrame, runs: Mapping, unusable: Mapping) -> xr.Dataset
     missing = [f"{e}_rep_{r}" for e in plan.index for r in replicates if (e, r) not in runs]
     if missing:
         raise files.InputError(f"no run of {', '.join(missing)}")
-    target = common_target(runs)
+    first = next(iter(runs))
+    target = common_target({first: runs[first]})
     rows = []
     for experiment in plan.index:
-        row = [_data_point(runs[experiment, r], target, (experiment, r) in unusable) for r in replicates]
+        row = []
+        for replicate in replicates:
+            key = experiment, replicate
+            run = runs[key]
+            common_target({key: run}, (first, target))
+            row.append(_data_point(run, target, key in unusable))
         rows.append(xr.concat(row, "replicate", coords="minimal", compat="override", join="exact"))
     dataset = xr.concat(rows, "experiment", coords="minimal", compat="override", join="exact")
     dataset = dataset.assign_coords(_coordinates(plan, replicates, target))
     return _described(dataset.assign(_of_designs(dataset)), unusable)
 
 
-def common_target(runs: Mapping) -> np.ndarray:
-    """Mass fractions m_k0 of the batch, which must be those of every run."""
-    targets = {
-        key: outflow.batch_fractions(run["diameter"].values, run["size_class"].values)
-        for key, run in runs.items()
-    }
-    (name, first), *others = targets.items()
-    for other, target in others:
-        if not np.allclose(target, first, rtol=0, atol=1e-9):
-            raise files.InputError(f"the batches of {name} and {other} differ in composition")
-    return first
+def common_target(runs: Mapping, known: tuple | None = None) -> np.ndarray:
+    """Mass fractions m_k0 of the batch, which must be those of every run.
+
+    known: a run's name and its mass fractions, which they must be too.
+    """
+    for key, run in runs.items():
+        target = outflow.batch_fractions(run["diameter"].values, run["size_class"].values)
+        known = known or (key, target)
+        if not np.allclose(target, known[1], rtol=0, atol=1e-9):
+            raise files.InputError(f"the batches of {known[0]} and {key} differ in composition")
+    return known[1]
 
 
 def _data_point(run: xr.Dataset, target: np.ndarray, unusable: bool) -> xr.Dataset:

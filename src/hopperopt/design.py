@@ -4,13 +4,14 @@ import csv
 import io
 import math
 import re
+from collections import Counter
 from itertools import product
 from typing import NamedTuple
 
 from hopperopt.document import NotAllowed
 from hopperopt.quantity import Quantity
 
-MOST_EXPERIMENTS = 1000  # a stage gets the plan in one argument, whose length the system limits
+MOST_EXPERIMENTS = 10_000
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 # Columns, dimensions and variables of the study's files, which no factor may be called.
@@ -123,10 +124,9 @@ def from_csv(text, factors):
     if len(rows) > MOST_EXPERIMENTS:
         raise NotAllowed(f"at most {MOST_EXPERIMENTS} experiments ({len(rows)} are there)")
     experiments = [_from_row(number, row, factors) for number, row in enumerate(rows, start=2)]
-    seen = [experiment.name for experiment in experiments]
-    for name in seen:
-        if seen.count(name) > 1:
-            raise NotAllowed(f"a name for each experiment ({name} is there twice)")
+    name, count = Counter(experiment.name for experiment in experiments).most_common(1)[0]
+    if count > 1:
+        raise NotAllowed(f"a name for each experiment ({name} is there twice)")
     return experiments
 
 

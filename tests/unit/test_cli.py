@@ -1,5 +1,6 @@
 """The command line: what it refuses and how it says so, and what a simulation by hand is."""
 
+import io
 import json
 from pathlib import Path
 from types import SimpleNamespace
@@ -213,6 +214,28 @@ def test_a_missing_input_and_bad_json_are_said_plainly(tmp_path, capsys):
         cli.main(["filter", "--params", "{", *missing])
     assert stopped.value.code == 2
     assert "no JSON" in capsys.readouterr().err
+
+
+def test_what_is_longer_than_an_argument_comes_from_standard_input(tmp_path, make_run, monkeypatch):
+    """A plan of 5,000 experiments; the paths of runs."""
+    plan = [{"name": f"exp_{n}", "design": {"length_mm": n / 7}, "levels": {}} for n in range(5000)]
+    text = json.dumps({"factors": ["length_mm"], "experiments": plan})
+    assert len(text) > 128 * 1024
+    design, *outputs = (str(tmp_path / name) for name in ("design.csv", "d.nc", "runs.csv", "designs.csv"))
+    monkeypatch.setattr("sys.stdin", io.StringIO(text))
+    assert cli.main(["design", "--params", "-", "--output", design]) == 0
+    assert len(files.read_table(design)) == 5000
+    plan = [{**row, "design": {"length_mm": 7.0}} for row in plan[:2]]
+    text = json.dumps({"factors": ["length_mm"], "experiments": plan})
+    assert cli.main(["design", "--params", text, "--output", design]) == 0
+    runs = [tmp_path / f"exp_{n}_rep_1.nc" for n in range(2)]
+    for run in runs:
+        files.write_netcdf(make_run(), run)
+    monkeypatch.setattr("sys.stdin", io.StringIO("".join(f"{run}\n" for run in runs)))
+    params = '{"factors": ["length_mm"], "incomplete": "refuse"}'
+    options = ["--params", params, "--design", design, "--simulations", "-", "--output", *outputs]
+    assert cli.main(["gather", *options]) == 0
+    assert files.read_table(outputs[1])["experiment"].tolist() == ["exp_0", "exp_1"]
 
 
 def test_every_stage_and_figure_has_its_function():

@@ -113,7 +113,7 @@ def test_unknown_key_is_named_with_its_value_and_the_nearest(key, value, said):
         ("surrogate.starts", 10**9, "at most 10000"),
         ("seed", 2**64, "at most 9.22337e+18"),
         ("discharge.time_limit_s", 1e6, "at most 10000"),
-        ("design.lhs.experiments", 1001, "at most 1000"),
+        ("design.lhs.experiments", 10_001, "at most 10000"),
         ("simulation.time_step_s", 1e-12, "at least 5.18e-09"),
         ("surrogate.hidden_nodes", [], "at least 1 entries"),
         ("surrogate.hidden_nodes", 7, "a list"),
@@ -125,7 +125,7 @@ def test_unknown_key_is_named_with_its_value_and_the_nearest(key, value, said):
         ("results_dir", "9" * 400, "the path of a folder"),
         ("insert.profile.points_mm", [], "at least 2 entries"),
         ("insert.profile.points_mm", [[0, 0]] * 1001, "at most 1000 entries"),
-        ("design.lhs.experiments", 10**6, "at most 1000"),
+        ("design.lhs.experiments", 10**6, "at most 10000"),
         ("filling.particles", 10**9, "at most 1e+07"),
         ("design.replicates", 401, "at most 400 for 25 designs"),
         ("verification.replicates", 1429, "at most 1428 for 7 designs"),
@@ -419,7 +419,7 @@ def test_own_plan_is_read_with_the_configuration(tmp_path):
         (FOUR_ROWS + "c,1_000,30\n", "line 6 has length_mm '1_000'"),
         ("experiment,length_mm,length_mm,height_mm\na,40,41,30\n", "each once"),
         (f'experiment,length_mm,height_mm\na,40,"{"9" * 200_000}"\n', "each once"),
-        ("experiment,length_mm,height_mm\n" + "a,40,30\n" * 1001, "at most 1000 experiments (1001 are"),
+        ("experiment,length_mm,height_mm\n" + "a,40,30\n" * 10_001, "at most 10000 experiments (10001 are"),
     ],
 )
 def test_own_plan_that_cannot_be_used(tmp_path, text, said):

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import weakref
 
 import numpy as np
 import pandas as pd
@@ -167,6 +168,22 @@ def test_a_file_that_is_no_run_is_named(study, make_run):
     files.write_netcdf(make_run().drop_vars(["status", "exit_time"]), study / "exp_02_rep_1.nc")
     with pytest.raises(files.InputError, match=r"exp_02_rep_1\.nc: is no run .* exit_time, status"):
         gather(study)
+
+
+def test_no_more_than_a_few_runs_are_held_at_a_time(study, monkeypatch):
+    """Thousands of runs would not fit: at any time nearly all that were read have been dropped."""
+    read, held = [], []
+
+    def watched(path, original=files.read_netcdf):
+        run = original(path)
+        if "exit_time" in run:
+            held.append(sum(kept() is not None for kept in read))
+            read.append(weakref.ref(run["exit_time"].values))
+        return run
+
+    monkeypatch.setattr(files, "read_netcdf", watched)
+    gather(study)
+    assert len(read) >= 6 and max(held) <= 2
 
 
 def test_designs_are_ranked_by_what_is_left_without_noise(study, make_run):

@@ -11,4 +11,5 @@ rule design:
         mem_mb=500,
         runtime=5,
     shell:
-        "python -m hopperopt design --params {params.settings:q} --output {output:q} > {log:q} 2>&1"
+        "printf %s {params.settings:q} | "
+        "python -m hopperopt design --params - --output {output:q} > {log:q} 2>&1"

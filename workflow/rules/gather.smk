@@ -16,5 +16,6 @@ rule gather:
         mem_mb=1000,
         runtime=10,
     shell:
-        "python -m hopperopt gather --params {params.settings:q} --design {input.design:q} "
-        "--simulations {input.simulations:q} --output {output.dataset:q} {output.runs:q} {output.designs:q} > {log:q} 2>&1"
+        "printf '%s\\n' {input.simulations:q} | "
+        "python -m hopperopt gather --params {params.settings:q} --design {input.design:q} --simulations - "
+        "--output {output.dataset:q} {output.runs:q} {output.designs:q} > {log:q} 2>&1"

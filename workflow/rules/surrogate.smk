@@ -75,8 +75,9 @@ rule validate:
         mem_mb=1000,
         runtime=10,
     shell:
-        "python -m hopperopt validate --params {params.settings:q} --training {input.training:q} "
-        "--folds {input.folds:q} --output {output.table:q} {output.predictions:q} > {log:q} 2>&1"
+        "printf '%s\\n' {input.folds:q} | "
+        "python -m hopperopt validate --params {params.settings:q} --training {input.training:q} --folds - "
+        "--output {output.table:q} {output.predictions:q} > {log:q} 2>&1"
 
 
 rule choose:

@@ -39,6 +39,6 @@ rule verify:
         mem_mb=500,
         runtime=5,
     shell:
-        "python -m hopperopt verify --params {params.settings:q} --simulations {input.simulations:q} "
-        "--surrogate {input.surrogate:q} --designs {input.designs:q} "
-        "--output {output.verdict:q} {output.glance:q} > {log:q} 2>&1"
+        "printf '%s\\n' {input.simulations:q} | "
+        "python -m hopperopt verify --params {params.settings:q} --simulations - "
+        "--surrogate {input.surrogate:q} --designs {input.designs:q} --output {output.verdict:q} {output.glance:q} > {log:q} 2>&1"
