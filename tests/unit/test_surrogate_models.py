@@ -40,6 +40,16 @@ def test_the_processes_find_the_curves_behind_the_noise(synthetic):
     assert (np.sqrt(np.mean((model.objectives(designs) - J) ** 2, axis=0)) < 0.6 * J.std(axis=0)).all()
 
 
+def test_some_of_many_experiments_find_the_hyperparameters_and_all_predict(synthetic, monkeypatch):
+    data, designs = synthetic.training(3), synthetic.anywhere(50, np.random.default_rng(0))
+    whole = gaussian.fit(data)
+    monkeypatch.setattr(gaussian, "SEARCHED", 13)
+    part = gaussian.fit(data)
+    assert len(part.designs) == 25 and not np.array_equal(part.lengths, whole.lengths)
+    difference = part.moments(designs, GRID)[0] - whole.moments(designs, GRID)[0]
+    assert (np.sqrt(np.mean(difference**2, axis=(0, 2))) < synthetic.noise / np.sqrt(3)).all()
+
+
 def test_without_an_effect_the_processes_predict_one_curve(synthetic):
     designs, bias = synthetic.anywhere(50, np.random.default_rng(0)), []
     J = objective(synthetic.curves(synthetic.designs).mean(axis=0), synthetic.batch)

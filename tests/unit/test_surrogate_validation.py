@@ -127,6 +127,19 @@ def test_experiments_without_a_complete_run_are_left_out(compared, tmp_path):
     assert joined.sizes["experiment"] == 24
 
 
+def test_folds_of_some_experiments_are_compared_with_these(compared):
+    data, _, predicted = compared
+    names = [str(name) for name in data["experiment"].values[::3]]
+    parts = predicted.drop_vars(["target", "U", "simulated_J", "within", "U_within"])
+    named = [
+        parts.sel(experiment=name).drop_vars("experiment").assign_attrs(experiment=name) for name in names
+    ]
+    joined = validation.join(named, data)
+    assert joined["experiment"].values.tolist() == names
+    for name in ("target", "U", "simulated_J", "within"):
+        np.testing.assert_array_equal(joined[name], predicted[name].sel(experiment=names), err_msg=name)
+
+
 def test_a_quadratic_surface_is_found_and_its_limits_hold():
     rng = np.random.default_rng(3)
     grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 4)] * 2), axis=-1).reshape(-1, 2)

@@ -18,6 +18,7 @@ from hopperopt.surrogate.training import choose_size
 # What predicts curves from the design, the simplest first.
 CANDIDATES = ("gaussian", "ensemble", f"ensemble{CLIPPED}", "network", f"network{CLIPPED}")
 DRAWS = 1000  # of curves, for the uncertainty of J
+SPREAD = 250  # designs at most at which they are drawn, all at once
 
 log = logging.getLogger(__name__)
 
@@ -113,7 +114,8 @@ def _fitted(name, data, params):
 
 
 def _spread(predictor, data, seed):
-    """Standard deviation of J over draws, (outputs,), rms over the designs of the training set."""
+    """Standard deviation of J over draws, (outputs,), rms over designs of the training set."""
     designs = np.column_stack([data[factor].values for factor in predictor.factors])
+    designs = designs[:: -(-len(designs) // SPREAD)]
     J = objective(predictor.draws(designs, DRAWS, np.random.default_rng(seed)), predictor.batch)
     return np.sqrt(np.mean(J.var(axis=0), axis=0))

@@ -47,7 +47,8 @@ def validate(
     data = read_netcdf(training)
     predicted = join(map(read_netcdf, folds), data)
     rows = score(predicted, data)
-    rows["noise_floor"] = noise_floor(data, np.random.default_rng(params["seed"]))
+    compared = data.sel(experiment=predicted["experiment"].values)
+    rows["noise_floor"] = noise_floor(compared, np.random.default_rng(params["seed"]))
     rows["random_points"] = random_points(data, params)
     write_table(pd.DataFrame([{"method": name, **rows[name]} for name in METHODS if name in rows]), table)
     write_netcdf(predicted.assign(_coverage_limits(predicted, params["seed"])), output)
@@ -67,9 +68,13 @@ def least_hits(number: int) -> int:
 
 
 def join(folds: Iterable[xr.Dataset], data: xr.Dataset) -> xr.Dataset:
-    """Predictions along `experiment`, as in the training set, what was simulated, which limits hold."""
+    """Predictions along `experiment`, as in the training set, what was simulated, which limits hold.
+
+    An experiment of the training set that has no fold is left out.
+    """
     named = {fold.attrs["experiment"]: fold for fold in folds}
-    names = [str(name) for name in data["experiment"].values]
+    names = [name for name in map(str, data["experiment"].values) if name in named]
+    data = data.sel(experiment=names)
     predicted = xr.concat([named[name].drop_attrs(deep=False) for name in names], "experiment", join="exact")
     predicted = predicted.assign_coords(experiment=names).assign(
         target=data["target"].drop_vars(data.attrs["factors"].split()),
