@@ -4,6 +4,7 @@
 # make setup               the environment alone; make cluster: and Snakemake's plugin for Slurm
 # make test, make lint     in the same environment: the tests; style and the boundaries between modules
 # make test-all            the tests with the full counts: hours
+# make test-cluster        the study on a Slurm cluster of virtual nodes: as root on Debian, an hour
 # make validation         the solver against closed forms and other codes: rewrites docs/validation.md; CASE=name for one
 # make archive             configuration, lock, data, tables and figures of the study as one zip file
 # make reference           config/config.schema.json and docs/configuration.md anew, from the models in config.py
@@ -28,7 +29,7 @@ endef
 # Tests of one file share what they set up, so a process takes whole files.
 pytest = .venv/bin/python -m pytest --numprocesses logical --maxprocesses 8 --dist loadfile
 
-.PHONY: study resume setup cluster test test-all lint validation archive reference lock
+.PHONY: study resume setup cluster test test-all test-cluster lint validation archive reference lock
 study: setup
 	$(lock_study); exec $(snakemake) --cores $(CORES)
 
@@ -48,6 +49,9 @@ test: setup
 
 test-all: setup
 	$(pytest) -m "full or not full"
+
+test-cluster: cluster
+	tests/cluster/run.sh
 
 validation: setup
 	.venv/bin/python -m validation $(CASE)
