@@ -4,7 +4,7 @@ import json
 import logging
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -68,23 +68,23 @@ def gather(
     files.write_table(ranked_designs(dataset), designs)
 
 
-class RunFiles(Mapping):
+class RunFiles(Mapping[tuple[str, int], xr.Dataset]):
     """Runs by (name, replicate) as datasets; each is read when it is asked for, and none is kept."""
 
     def __init__(self, paths: Mapping[tuple[str, int], Path]):
         self._paths = paths
 
-    def __getitem__(self, key):
+    def __getitem__(self, key: tuple[str, int]) -> xr.Dataset:
         path = self._paths[key]
         run = files.read_netcdf(path)
         if missing := RUN - set(run.data_vars):
             raise files.InputError(f"{path}: is no run of a simulation: no {', '.join(sorted(missing))}")
         return run.drop_dims("snapshot", errors="ignore")  # snapshots are large
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[tuple[str, int]]:
         return iter(self._paths)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self._paths)
 
 
