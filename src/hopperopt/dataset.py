@@ -180,12 +180,15 @@ def common_target(runs: Mapping, known: tuple | None = None) -> np.ndarray:
 
     known: a run's name and its mass fractions, which they must be too.
     """
+
+    def batch(run):
+        return outflow.batch_fractions(run["diameter"].values, run["size_class"].values)
+
+    name, target = known or next((key, batch(run)) for key, run in runs.items())
     for key, run in runs.items():
-        target = outflow.batch_fractions(run["diameter"].values, run["size_class"].values)
-        known = known or (key, target)
-        if not np.allclose(target, known[1], rtol=0, atol=1e-9):
-            raise files.InputError(f"the batches of {known[0]} and {key} differ in composition")
-    return known[1]
+        if not np.allclose(batch(run), target, rtol=0, atol=1e-9):
+            raise files.InputError(f"the batches of {name} and {key} differ in composition")
+    return target
 
 
 def _data_point(run: xr.Dataset, target: np.ndarray, unusable: bool) -> xr.Dataset:
