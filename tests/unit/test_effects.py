@@ -86,11 +86,11 @@ def test_the_sources_add_up_and_a_term_has_what_it_explains():
 
 def test_noise_alone_is_found_at_its_level():
     rng = np.random.default_rng(2)
-    tables = [anova(plan(L25, *rng.normal(1e-4, 1e-5, (2, 25)))) for _ in range(80)]
+    tables = [anova(plan(L25, *rng.normal(1e-4, 1e-5, (2, 25)))) for _ in range(40)]
     p = np.array([table["p"].unstack("source") for table in tables]).reshape(-1, len(tables[0]) // 2)
     found = np.nanmean(p < 0.05, axis=0)[np.isfinite(p).any(axis=0)]
     assert len(found) == 7
-    assert found[:-1].max() < 0.12 and found.mean() == pytest.approx(0.05, abs=0.025)
+    assert found[:-1].max() < 0.15 and found.mean() == pytest.approx(0.05, abs=0.03)
 
 
 def test_an_interaction_is_a_lack_of_fit():

@@ -131,7 +131,7 @@ def test_outputs_agree_with_each_other_and_with_the_network(run):
 
 
 def test_same_seed_same_result(run):
-    first, second, third = (run(seed=seed) for seed in (1, 1, 2))
+    first, second, third = (run(seed=seed, generations=10) for seed in (1, 1, 2))
     assert first[1].identical(second[1]) and first[2] == second[2]
     assert not first[1].equals(third[1])
 
@@ -158,13 +158,13 @@ def test_explicit_design_is_taken_as_it_is(run):
 
 
 def test_front_shorter_than_the_networks_uncertainty_gives_the_compromise(run, caplog):
-    usual = run()[2]
+    usual = run(generations=10)[2]
     assert usual["rule"] == "knee"
-    selected = run(model=predictor()._replace(objective_error=np.array([1.0, 1.0])))[2]
+    selected = run(model=predictor()._replace(objective_error=np.array([1.0, 1.0])), generations=10)[2]
     assert selected["rule"] == "compromise"
     assert "shorter than the predictions' uncertainty" in selected["warning"]
     assert selected["warning"] in caplog.text
-    assert run(model=predictor()._replace(objective_error=np.array([1e-6, 1e-6])))[2] == usual
+    assert run(model=predictor()._replace(objective_error=np.array([1e-6, 1e-6])), generations=10)[2] == usual
 
 
 def test_optimum_on_a_bound_is_warned_of_until_the_range_reaches_beyond(run, caplog):
