@@ -216,7 +216,8 @@ def _outlook(seen: Seen) -> str:
     if count[DONE] == count.total():
         return "all simulations are done"
     if not count[RUNNING]:
-        return "no simulation is running: `make` begins and goes on, `make resume` after an interruption"
+        goes_on = "`make` goes on, `make resume` after an interruption"
+        return f"no simulation is running; if nothing else is, {goes_on}"
     seconds = left(seen)
     if seconds is None:
         return "time to go: known when the first simulations have ended"
