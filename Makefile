@@ -1,9 +1,11 @@
 # make                     the locked environment in .venv, then the full study
 # make resume              the same after an interruption: simulations go on from their last checkpoints
 # make STUDY=my-hopper     the study in another directory, with a config.yaml of its own; also with resume
+# make report              the study on one page, results/report.html, and what it needs; make writes it as well
 # make setup               the environment alone; make cluster: and Snakemake's plugin for Slurm
 # make test, make lint     in the same environment: the tests; style and the boundaries between modules
 # make test-all            the tests with the full counts: hours
+# make test-browser        the report's page in Debian's Chromium; skipped where that is missing
 # make test-cluster        the study on a Slurm cluster of virtual nodes: as root on Debian, an hour
 # make validation         the solver against closed forms and other codes: rewrites docs/validation.md; CASE=name for one
 # make archive             configuration, lock, data, tables and figures of the study as one zip file
@@ -29,12 +31,15 @@ endef
 # Tests of one file share what they set up, so a process takes whole files.
 pytest = .venv/bin/python -m pytest --numprocesses logical --maxprocesses 8 --dist loadfile
 
-.PHONY: study resume setup cluster test test-all test-cluster lint validation archive reference lock
+.PHONY: study resume report setup cluster test test-all test-browser test-cluster lint validation archive reference lock
 study: setup
 	$(lock_study); exec $(snakemake) --cores $(CORES)
 
 resume: setup
 	$(lock_study); $(snakemake) --unlock && exec $(snakemake) --cores $(CORES) --rerun-incomplete
+
+report: setup
+	$(lock_study); exec $(snakemake) --cores $(CORES) report
 
 setup: $(stamp)
 
@@ -49,6 +54,9 @@ test: setup
 
 test-all: setup
 	$(pytest) -m "full or not full"
+
+test-browser: setup
+	.venv/bin/python -m pytest -m "full or not full" tests/browser
 
 test-cluster: cluster
 	tests/cluster/run.sh

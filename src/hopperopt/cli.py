@@ -6,6 +6,7 @@ A stage's command gets its configuration as one JSON string and its files as opt
 
 import argparse
 import errno
+import functools
 import importlib
 import json
 import logging
@@ -96,6 +97,24 @@ STAGES = {
         ("verdict.csv", "glance.csv"),
         "judge the cases simulated anew",
     ),
+    "report": Stage(
+        "report.page",
+        "report",
+        (
+            "dataset",
+            "validation",
+            "comparison",
+            "surrogate",
+            "front",
+            "selected",
+            "verdict",
+            "simulations*",
+            "verification*",
+            "figures*",
+        ),
+        ("report.html",),
+        "write the study on one page",
+    ),
 }
 SIMULATION, RECORDED = "experiment", "snapshots"  # modules that simulate, without and with snapshots
 # Options of each figure's inputs; a figure is drawn by the module `figures.NAME`.
@@ -111,6 +130,8 @@ FIGURES = {
     "errors": ("validation", "surrogate"),
     "sensitivity": ("sobol",),
 }
+# Those that the report shows as they are; of the others it has drawings of its own.
+REPORTED = [name for name in FIGURES if name not in ("hopper", "curves")]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -218,11 +239,22 @@ def _run_stage(given: argparse.Namespace) -> None:
     inputs = [sys.stdin.read().splitlines() if paths == [STDIN] else paths for paths in inputs]
     from hopperopt import files
 
+    if "derived" in given.params:
+        given.params["case_of"] = functools.partial(_derived_case, given.params["derived"])
     module = importlib.import_module(f"hopperopt.{given.stage.module}")
     # A figure is one thing in several formats: it takes its outputs as one list.
     outputs = [given.output] if given.stage.function == "write" else given.output
     with files.stamped(provenance.attributes()):
         getattr(module, given.stage.function)(given.params, *inputs, *outputs)
+
+
+def _derived_case(params: Mapping, design: Mapping[str, float]) -> dict | None:
+    """The case of a design that the study found, or None where it cannot be simulated."""
+    from hopperopt import config
+
+    with suppress(ConfigError):
+        return config.derived_case(params, design)
+    return None
 
 
 def _add_simulate(command: argparse.ArgumentParser) -> None:

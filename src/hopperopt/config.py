@@ -748,7 +748,15 @@ STAGES = {
         "seed": study.surrogate.seed,
     },
     "figures": lambda study: study.figures.model_dump(),
+    "report": lambda study: {
+        "cases": study.stage_params("verify")["cases"],
+        "factors": list(study.factors),
+        "derived": study.derived_params("report", 1),
+        # Nothing that the files it is made of do not depend on.
+        "settings": {stage: study.stage_params(stage) for stage in SHOWN},
+    },
 }
+SHOWN = ("filter", "train", "validate", "choose", "optimise", "verify", "figures")  # in the report
 
 
 def run_seed(seed, name, replicate):

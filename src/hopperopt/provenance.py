@@ -46,6 +46,11 @@ def code_digest(*modules: str, package: Path = PACKAGE) -> str:
     return hashlib.sha256(json.dumps(texts, sort_keys=True).encode()).hexdigest()[:20]
 
 
+def files_digest(folder: Path, *names: str) -> str:
+    """Digest of what stands in files of a folder."""
+    return hashlib.sha256(b"\0".join((folder / name).read_bytes() for name in names)).hexdigest()[:20]
+
+
 def solver_digest(package: Path = PACKAGE) -> str:
     """Digest of the code of all modules of the compiled solver."""
     names = sorted(path.stem for path in (package / "dem").glob("*.py") if path.stem != "__init__")

@@ -59,17 +59,18 @@ def jobs(row):
     for column, cell in row.items():
         names = everything.get(column, []) if cell in ("all", "rep_2") else cell.split()
         if column == "figures":
-            found |= {f"figure_{name}" for name in names}
+            found |= {name if name == "report" else f"figure_{name}" for name in names}
         elif column in everything:
             found |= {f"{column} {name}_{'rep_2' if cell == 'rep_2' else 'rep_1'}" for name in names}
         elif cell == "●":
             found.add(column)
-    return found
+    # The report has no column: it is made of all but these.
+    return found | {"report"} if found - {"figure_hopper", "figure_curves"} else found
 
 
 def test_cells_hold_nothing_else():
     """A misspelt cell would be a rerun that no other test could see."""
-    figure = "|".join(cli.FIGURES)
+    figure = "|".join([*cli.FIGURES, "report"])
     runs = r"all|rep_2|exp_0\d|5|10|(selected( best_f)?( plan_best)?|bare|other)( plan_centre)?"
     allowed = {"simulate": runs, "verify_simulate": runs, "figures": rf"all|(({figure})\b ?)+"}
     for first, row in [item for table in TABLES.values() for item in table.items()]:
@@ -220,7 +221,8 @@ def test_the_code_of_snapshots_counts_where_they_are_taken(study):
 def test_more_runs_of_one_case_are_all_that_runs(study):
     override(study, "verification.replicates_of.bare", 2)
     planned = study.planned("--configfile", "other.yaml")
-    assert planned == {"verify_simulate bare_rep_2", "verify", "figure_verdict", "figure_front"}
+    after = {"verify", "figure_verdict", "figure_front", "report"}
+    assert planned == {"verify_simulate bare_rep_2"} | after
 
 
 # The code.
@@ -272,6 +274,13 @@ def test_code_changes_the_digests_of_its_rows_rules(tmp_path):
 def test_code(study, module):
     study.add_code(module, EXTRA)
     assert study.planned() == jobs(code_row(module))
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", ["page.html", "style.css", "charts.js"])
+def test_another_page_is_the_reports_alone(study, name):
+    study.add_code(f"report/{name}", "\n")
+    assert study.planned() == {"report"}
 
 
 @pytest.mark.full

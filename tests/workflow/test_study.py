@@ -13,6 +13,7 @@ from hopperopt import files
 pytestmark = pytest.mark.slow
 
 OUTPUTS = """
+    report.html
     design.csv dataset.nc runs.csv designs.csv surrogate/training.nc surrogate/network.nc surrogate/errors.csv
     optimum/front.csv optimum/history.nc optimum/selected.yaml verification/verdict.csv
     verification/glance.csv simulations/exp_01_rep_1.nc verification/selected_rep_1.nc

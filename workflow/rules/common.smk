@@ -86,6 +86,12 @@ def compared_surrogates():
     return [result("surrogate/validation.nc")] if STUDY.surrogate.model == "auto" else []
 
 
+def report_params():
+    """Parameters of the report, with a digest of its page's parts that are no Python modules."""
+    parts = provenance.files_digest(provenance.PACKAGE / "report", "page.html", "style.css", "charts.js")
+    return as_json(STUDY.stage_params("report") | {"page": parts}, cli.STAGES["report"].module)
+
+
 def figure(name):
     """Parameters of a figure."""
     return as_json(STUDY.stage_params("figures"), f"figures.{name}")

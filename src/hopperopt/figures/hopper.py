@@ -42,7 +42,7 @@ def draw(run: xr.Dataset) -> Figure:
     walls = walls_of(case)
     rows = {
         "before the discharge": PER_M * run["position_opening"].values,
-        _words_for(moments.half_time(run)): PER_M * run["position_half"].values,
+        words_for(moments.half_time(run)): PER_M * run["position_half"].values,
     }
     sensor = PER_M * case["discharge"]["sensor"]
     limits = limits_of(run, case)
@@ -69,7 +69,8 @@ def draw(run: xr.Dataset) -> Figure:
     return figure
 
 
-def _words_for(half):
+def words_for(half):
+    """Words for the time (s) at which half of the mass had left, NaN if it never did."""
     return "never half discharged" if np.isnan(half) else f"at $M$ = 0.5, after {half:.2f} s"
 
 
@@ -131,18 +132,23 @@ def draw_particles(axes: Axes, run, position, colours, side, limits, resolution)
     position (n, 3), mm; colours (n, 3); side: one of `SIDES`; limits: left, right, bottom, top (mm) of what
     is shown; resolution: pixels per mm.
     """
+    image = picture(run, position, colours, side, limits, resolution)
+    return axes.imshow(image, extent=limits, zorder=2, aspect="auto")
+
+
+def picture(run, position, colours, side, limits, resolution) -> np.ndarray:
+    """Image of the particles behind the cut, see spheres.render; arguments as for draw_particles."""
     order, sign, _ = SIDES[side]
     centre = position[:, order] * [1, 1, sign]
     # A particle that has left, or that blew up, has no finite position.
     shown = np.isfinite(centre).all(axis=1) & (centre[:, 2] >= 0)
-    image = spheres.render(
+    return spheres.render(
         centre[shown],
         PER_M * run["diameter"].values[shown] / 2,
         colours[shown],
         spheres.View(*limits, resolution=resolution),
         depth=limits[1],
     )
-    return axes.imshow(image, extent=limits, zorder=2, aspect="auto")
 
 
 def _finish_axes(axes, limits):

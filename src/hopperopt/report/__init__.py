@@ -1,0 +1,1 @@
+"""The study on one page: results/report.html, self-contained."""

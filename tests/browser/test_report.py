@@ -1,0 +1,144 @@
+"""The report's page in a real browser: it renders, its charts answer, nothing spills over.
+
+Needs Chromium and its driver (Debian: apt install chromium chromium-driver).
+"""
+
+import json
+import shutil
+
+import pytest
+
+from hopperopt.report import page
+
+PROGRAMS = [shutil.which(name) for name in ("chromium", "chromedriver")]
+pytestmark = [
+    pytest.mark.full,
+    pytest.mark.skipif(
+        None in PROGRAMS,
+        reason="needs Chromium and its driver (Debian: apt install chromium chromium-driver)",
+    ),
+]
+WIDTHS = (400, 1400)
+# Number of sections upon others, how much wider the page is than its window, words covered or cut off.
+FAULTS = """
+const box = element => element.getBoundingClientRect();
+const parts = [...document.querySelectorAll("header, nav, section")];
+const upon = parts.slice(1).filter((part, n) => box(part).top < box(parts[n]).bottom - 1).length;
+const common = (a, b) =>
+  Math.min(a.right - b.left, b.right - a.left, a.bottom - b.top, b.bottom - a.top) > 1;
+const words = [...document.querySelectorAll("svg")].flatMap(svg => {
+  const texts = [...svg.querySelectorAll("text")], frame = box(svg);
+  const cut = texts.filter(text => box(text).left < frame.left - 1 || box(text).right > frame.right + 1);
+  const covered = texts.filter((a, n) => texts.slice(n + 1).some(b => common(box(a), box(b))));
+  return [...cut, ...covered].map(text => text.textContent);
+});
+return [upon, document.documentElement.scrollWidth - innerWidth, words];
+"""
+
+
+@pytest.fixture(scope="module")
+def browser():
+    webdriver = pytest.importorskip("selenium.webdriver")
+    options = webdriver.ChromeOptions()
+    for argument in ("--headless=new", "--no-sandbox", "--hide-scrollbars"):
+        options.add_argument(argument)
+    options.binary_location = PROGRAMS[0]
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    driver = webdriver.Chrome(options, webdriver.ChromeService(PROGRAMS[1]))
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory, make_report_study):
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    study, case_of = make_report_study()
+    path.write_text(page.render(study, {}, case_of, {}), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def opened(browser, report):
+    """Function that opens the report in a window of a width."""
+
+    def at(width=1400):
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        browser.get(report.as_uri())
+        return browser
+
+    return at
+
+
+def all_of(browser, selector, attribute):
+    script = "return [...document.querySelectorAll(arguments[0])].map(e => e.getAttribute(arguments[1]))"
+    return browser.execute_script(script, selector, attribute)
+
+
+def text_of(browser, selector):
+    return browser.execute_script("return document.querySelector(arguments[0]).textContent", selector)
+
+
+def move_to(browser, selector):
+    """Point at the middle of an element as drawn."""
+    from selenium.webdriver import ActionChains
+
+    element = browser.find_element("css selector", selector)
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
+    ActionChains(browser).move_to_element(element).perform()
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_renders_without_errors_and_asks_for_nothing(opened, report, width):
+    browser = opened(width)
+    assert browser.get_log("browser") == []
+    messages = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
+    asked = [m["params"]["request"]["url"] for m in messages if m["method"] == "Network.requestWillBeSent"]
+    assert {url for url in asked if not url.startswith("data:")} <= {report.as_uri()}
+    drawn = browser.execute_script("return document.querySelectorAll('.chart svg path.axis').length")
+    assert drawn > 20
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_nothing_overlaps_or_spills_over(opened, width):
+    upon, too_wide, words = opened(width).execute_script(FAULTS)
+    assert (upon, too_wide, words) == (0, 0, [])
+
+
+def test_pointing_at_a_curve_shows_its_experiment(opened):
+    browser = opened()
+    move_to(browser, "#curve-chart svg")
+    (chosen,) = all_of(browser, "#curve-chart .chosen", "data-experiment")
+    name = browser.find_element("css selector", f"#experiment option[value='{chosen}']").text
+    told = text_of(browser, "#curve-design")
+    assert told.startswith(f"{name}: θ = ") and told.endswith("mean of 1 run")
+
+
+def test_an_experiment_can_be_chosen_by_name(opened):
+    browser = opened()
+    browser.find_element("css selector", "#experiment").send_keys("exp_07")
+    assert all_of(browser, "#curve-chart .chosen", "data-experiment") == ["6"]
+
+
+def test_another_size_has_other_curves(opened):
+    browser = opened()
+    seen = []
+    for name in ("fine", "intermediate", "coarse"):
+        browser.find_element("css selector", f"#sizes input[value={name}]").click()
+        seen.append(tuple(all_of(browser, "#curve-chart .curve", "d")))
+        assert f"{name} particles" in text_of(browser, "#curve-chart")
+    assert len(set(seen)) == 3 and all(len(paths) == 25 for paths in seen)
+
+
+def test_a_point_of_the_front_shows_its_design(opened):
+    from selenium.webdriver import Keys
+
+    browser = opened()
+    seen = []
+    for n in range(1, 6):
+        move_to(browser, f"#front-chart circle:nth-of-type({n})")
+        (drawing,) = all_of(browser, "#front-insert", "d")
+        seen.append((text_of(browser, "#front-design table"), drawing))
+    assert len({words for words, _ in seen}) == len({drawing for _, drawing in seen}) == 5
+    browser.find_element("css selector", "#front-chart circle:nth-of-type(5)").send_keys(Keys.ARROW_LEFT)
+    assert text_of(browser, "#front-design table") == seen[3][0]
