@@ -4,6 +4,7 @@ import inspect
 import itertools
 import json
 import math
+from pathlib import Path
 from unittest import mock
 
 import numpy as np
@@ -11,6 +12,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 from matplotlib.colors import to_rgb
+from matplotlib.testing.compare import compare_images
 from matplotlib.text import Text
 
 from hopperopt import cli, config, dataset, outflow, preview, provenance
@@ -339,14 +341,18 @@ def test_effects_can_be_read(factors):
             assert low <= band.min() and band.max() <= high
 
 
-@pytest.mark.parametrize("factors", [["theta_deg"], [*FACTORS], [*FACTORS, "friction", "outlet_mm", "c"]])
-def test_sensitivity_can_be_read(factors):
+def table_of_sensitivity(factors, half=0.3):
     rows = list(itertools.product(sensitivity.TITLES, factors))
     table = pd.DataFrame(rows, columns=["output", "factor"]).assign(first=0.2, total=0.6)
+    for kind in ("first", "total"):
+        table[f"{kind}_low"], table[f"{kind}_high"] = table[kind] - half, table[kind] + half
+    return table
+
+
+@pytest.mark.parametrize("factors", [["theta_deg"], [*FACTORS], [*FACTORS, "friction", "outlet_mm", "c"]])
+def test_sensitivity_can_be_read(factors):
     for half in (0.3, np.nan):
-        for kind in ("first", "total"):
-            table[f"{kind}_low"], table[f"{kind}_high"] = table[kind] - half, table[kind] + half
-        check_texts(sensitivity.draw(table))
+        check_texts(sensitivity.draw(table_of_sensitivity(factors, half)))
 
 
 def test_hopper_can_be_read(run):
@@ -450,3 +456,33 @@ def test_every_figure_takes_the_inputs_of_its_command(name):
     modules = {module.__name__.rpartition(".")[2]: module for module in FIGURES}
     parameters = inspect.signature(modules[name].write).parameters
     assert list(parameters) == ["params", *(option.rstrip("*") for option in cli.FIGURES[name]), "outputs"]
+
+
+BASELINE = Path(__file__).parent / "baseline"
+TOLERANCE = 1.0  # rms of 255; a label elsewhere or another colour of a line is above it
+
+
+@pytest.mark.parametrize("name", cli.FIGURES)
+def test_looks_as_it_did(name, make_plan, make_training, make_run, run, tmp_path):
+    """To renew the images: rm tests/unit/baseline/*.png; make test writes new ones. Look at each of them."""
+    draw = {
+        "hopper": lambda: hopper.draw(run),
+        "curves": lambda: curves.draw(make_plan(7, replicates=2, dropped=[("exp_04", 1), ("exp_04", 2)])),
+        "indices": lambda: indices.draw(make_plan(7, replicates=2)),
+        "effects": lambda: effects.draw(table_of_effects(FACTORS)),
+        "sensitivity": lambda: sensitivity.draw(table_of_sensitivity(FACTORS)),
+        "fit": lambda: fit.draw(*make_training(experiments=7)),
+        "verification": lambda: verification.draw(
+            [make_run(seed=1)], CASE["design"], BATCH[:2], np.repeat(BATCH[:2, None], 21, axis=1)
+        ),
+        "verdict": lambda: verdict.draw(table_of_cases(), table_of_designs()),
+        "front": lambda: front.draw(table_of_front(), make_plan(10), table_of_cases()),
+        "errors": lambda: errors.draw(table_of_methods(), "gaussian"),
+    }
+    drawn, kept = tmp_path / f"{name}.png", BASELINE / f"{name}.png"
+    style.save(draw[name](), [drawn], 60)
+    if not kept.exists():
+        kept.parent.mkdir(exist_ok=True)
+        kept.write_bytes(drawn.read_bytes())
+        pytest.fail(f"{kept} was missing and is written: look at it, and test again")
+    assert compare_images(str(kept), str(drawn), TOLERANCE) is None
