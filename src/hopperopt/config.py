@@ -714,6 +714,7 @@ class Study(Setup):
 
 
 # Lists keep the order of factors and cases, which the sorted keys of a job's JSON would not.
+SHOWN = ("filter", "train", "validate", "choose", "optimise", "verify", "figures")  # in the report
 STAGES = {
     "design": lambda study: {
         "factors": list(study.factors),
@@ -756,7 +757,6 @@ STAGES = {
         "settings": {stage: study.stage_params(stage) for stage in SHOWN},
     },
 }
-SHOWN = ("filter", "train", "validate", "choose", "optimise", "verify", "figures")  # in the report
 
 
 def run_seed(seed, name, replicate):

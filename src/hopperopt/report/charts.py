@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import pandas as pd
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from hopperopt import uncertainty
 from hopperopt.dataset import replicates
@@ -15,10 +16,11 @@ MOST_POINTS = 200  # of a front; of a longer one every so manyth is shown
 OBJECTIVES = ("J_fine", "J_intermediate")
 
 
-def numbers(values: np.ndarray, digits: int = DIGITS) -> list:
+def numbers(values: ArrayLike, digits: int = DIGITS) -> list:
     """Nested lists of an array, rounded; None for what is not finite, which JSON does not know."""
-    values = np.round(np.asarray(values, float), digits)
-    return np.where(np.isfinite(values), values.astype(object), None).tolist()
+    rounded = np.round(np.asarray(values, float), digits).astype(object)
+    rounded[~np.isfinite(np.asarray(values, float))] = None
+    return rounded.tolist()
 
 
 def curves(dataset: xr.Dataset, factors: Sequence[str]) -> dict:

@@ -90,7 +90,8 @@ def factor_words(keys: Mapping[str, str]) -> dict[str, str]:
 
 def factors(data: xr.Dataset, keys: Mapping[str, str], selected: Mapping[str, float]) -> Rows:
     """(name, symbol, key of the configuration, range in the plan, values in it, selected value)."""
-    words, rows = factor_words(keys), []
+    words = factor_words(keys)
+    rows: Rows = []
     for name, key in keys.items():
         values, unit = np.unique(data[name].values), answer.plain(answer.style.factor_parts(name)[1])
         span = f"{values.min():.4g} to {values.max():.4g}{unit}"
@@ -109,9 +110,9 @@ def warnings(
     """
     found = (selected["warning"] or "").split("; ")
     lost = "no effect of the design is detectable in the objective of the {} particles"
-    found += map(lost.format, undetectable)
+    found += [lost.format(objective) for objective in undetectable]
     for group in runs:
-        found.append(dataset.missed_levels(group))
+        found.append(dataset.missed_levels(group) or "")
         unusable = dataset.unusable_runs(group)
         found += [f"{name}, filling {number}: {why}" for (name, number), why in unusable.items()]
     return [f"{text[0].upper()}{text[1:]}." for text in found if text]
@@ -137,7 +138,8 @@ def surrogates(table: pd.DataFrame, chosen: str) -> list[dict]:
 
 def run_times(groups: Mapping[str, Mapping[tuple[str, int], xr.Dataset]]) -> Rows:
     """A row for each group of runs: (name, runs, shortest, mean, longest, all, speed), and one for all."""
-    rows, everything = [], {}
+    rows: Rows = []
+    everything: dict[tuple, xr.Dataset] = {}
     for name, runs in groups.items():
         everything |= {(name, *key): run for key, run in runs.items()}
         rows.append((name, *_times(runs.values())))
@@ -171,7 +173,7 @@ def origins(attributes: Mapping[str, Sequence[Mapping]]) -> Rows:
     """
     rows = []
     for name, group in attributes.items():
-        ways = {}
+        ways: dict[tuple, list[str]] = {}
         for found in group:
             way = tuple(found.get(key, "") for key in ("git", "hopperopt_version", "code_digest", "host"))
             ways.setdefault(way, []).append(found.get("created", ""))
