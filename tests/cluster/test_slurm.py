@@ -5,6 +5,7 @@ import shutil
 import signal
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,14 @@ class Struck(OnSlurm, Killed):
         entries = Path(f"/proc/{process}/environ").read_bytes().split(b"\0")
         return dict(entry.decode().split("=", 1) for entry in entries if entry)
 
+    def kill_all(self, **variables):
+        """Kill all processes of the study that have these environment variables."""
+        for process in Path("/proc").glob("[0-9]*"):
+            with suppress(OSError):
+                own = (process / "cwd").resolve() == self.directory.resolve()
+                if own and variables.items() <= self.environment_of(process.name).items():
+                    os.kill(int(process.name), signal.SIGKILL)
+
     def check_simulations(self, finished):
         """The two simulations have the bits of the undisturbed ones, and nothing else has run."""
         for path, before in self.done.items():
@@ -68,11 +77,11 @@ def struck(finished, tmp_path):
     study = Struck(finished, tmp_path)
     yield study
     study.hold.unlink(missing_ok=True)
+    slurm("scancel", "--user", "root")
+    study.kill_all()
     for process in study.started:
-        process.kill()
         process.wait()
         process.stdout.close()
-    slurm("scancel", "--user", "root")
 
 
 def ended(process):
@@ -100,9 +109,10 @@ def test_a_cancelled_job_is_repeated_from_its_checkpoint(struck, finished):
 def test_the_jobs_of_a_lost_node_go_to_another(struck, finished):
     snakemake = struck.start_snakemake(*struck.targets)
     first, _ = struck.wait_until_held()
-    node = struck.environment_of(first)["SLURMD_NODENAME"]
+    job, node = (struck.environment_of(first)[name] for name in ("SLURM_JOB_ID", "SLURMD_NODENAME"))
     slurm("scontrol", "update", f"NodeName={node}", "State=DOWN", "Reason=test")
     try:
+        struck.kill_all(SLURM_JOB_ID=job)  # as a loss of power does
         struck.wait(lambda: ended(first))
         struck.hold.unlink()
         finish(snakemake)
