@@ -690,7 +690,7 @@ class Study(Setup):
     def derived_params(self, name, replicate):
         """What `derived_case` needs, beside the design that is found later, for one run (plain JSON)."""
         centre = self.with_design(plans.centre(self.levels)).document
-        setup = {key: centre[key] for key in Setup.model_fields if key != "seed"}
+        setup = json.loads(json.dumps({key: centre[key] for key in Setup.model_fields if key != "seed"}))
         # Without what no case depends on, which would only rerun the simulation.
         used = ("shape",) if self.insert.shape == "none" else ("shape", "height_mm", self.insert.shape)
         setup["insert"] = {key: value for key, value in setup["insert"].items() if key in used}

@@ -33,7 +33,7 @@ def data(path):
 def differing(results, others):
     """Names of the files of a study that another does not hold in the same way."""
     paths = [path for suffix in SUFFIXES for path in results.rglob(f"*.{suffix}")]
-    assert len(paths) == 44
+    assert len(paths) == 53
     return [
         str(path.relative_to(results))
         for path in paths
