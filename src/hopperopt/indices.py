@@ -16,7 +16,6 @@ variance s^2 of each window:
 """
 
 import numpy as np
-from scipy.stats import spearmanr
 
 from hopperopt import outflow
 
@@ -60,5 +59,7 @@ def residence_order(exit_time: np.ndarray, position: np.ndarray) -> float:
     exit_time (particle,): s, NaN for what stayed and does not count; position (particle, 3): m, at
     the opening.
     """
+    from scipy.stats import spearmanr  # slow to import
+
     left = np.isfinite(exit_time)
     return float(spearmanr(position[left, 2], exit_time[left]).statistic) if left.sum() > 1 else np.nan

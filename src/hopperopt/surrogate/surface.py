@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from hopperopt.surrogate.network import range_scaling
 
@@ -45,5 +45,5 @@ def _regression(terms, squares, at):
         return Prediction(*np.full((3, squares.shape[1]), np.nan))
     coefficients, weights = inverse @ squares, at @ inverse
     variance = np.sum((squares - terms @ coefficients) ** 2, axis=0) / freedom
-    value, half = at @ coefficients, t.ppf(0.95, freedom) * np.sqrt(variance * (1 + weights @ weights))
+    value, half = at @ coefficients, stdtrit(freedom, 0.95) * np.sqrt(variance * (1 + weights @ weights))
     return Prediction(value, value - half, value + half)

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import pandas as pd
 import xarray as xr
-from scipy.stats import binom
 
 from hopperopt.files import read_netcdf, write_netcdf, write_table
 from hopperopt.outflow import signed_root
@@ -64,6 +63,8 @@ def validate(
 
 def least_hits(number: int) -> int:
     """Hits of so many experiments with which intervals of 90 % are consistent."""
+    from scipy.stats import binom  # slow to import
+
     return int(binom.ppf(RARE, number, 0.9))
 
 
