@@ -158,6 +158,10 @@ def unusual(setup):
     if 0 < (width := 2 * geometry.opening_radius(profile)) < least * coarse:
         text = f"an opening through it of {width / coarse:.3g} coarse diameters{{where}} may jam"
         yield Finding(f"insert.{setup.insert.shape}", "opening", -width, f"{text}; usual: {least} or more")
+    if not geometry.is_solid(profile):
+        text = "a shell without thickness{where}: spheres on its two sides feel each other"
+        text += "; usual: a line that closes, or that has both ends on the axis"
+        yield Finding(f"insert.{setup.insert.shape}", "shell", 0, text)
     if (width := float(profile[:, 0].max())) < coarse / 2:
         text = f"its radius, {width * MM:.3g} mm{{where}}, is less than a coarse sphere's"
         text += _unit(width * MM, coarse / 2 * MM, setup.hopper.cylinder_radius_mm)

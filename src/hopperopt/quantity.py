@@ -37,13 +37,13 @@ class Quantity:
 
     def _holds(self, number, whole):
         try:
-            number = float(number)
-        except OverflowError:
+            finite = math.isfinite(number)
+        except OverflowError:  # an integer beyond all floats
             return False
-        if not math.isfinite(number):
+        if not finite:
             return self.infinite and number > 0
         return (
-            (not whole or number.is_integer())
+            (not whole or number == int(number))
             and (self.above is None or number > self.above)
             and (self.least is None or number >= self.least)
             and (self.below is None or number < self.below)

@@ -719,6 +719,12 @@ def test_design_is_validated():
             study.simulation_case(design, "by_hand", 1)
 
 
+def test_largest_seed_is_allowed_and_kept():
+    assert config.parse({"seed": 2**63 - 1}).seed == 2**63 - 1
+    with pytest.raises(config.ConfigError, match="seed: 9223372036854775808 is not allowed"):
+        config.parse({"seed": 2**63})
+
+
 def test_stage_params_hold_their_own_settings_in_order():
     study = config.parse({})
     assert study.stage_params("gather") == {"factors": list(CENTRE), "incomplete": "refuse"}

@@ -194,6 +194,17 @@ def test_narrow_opening_is_a_warning():
     )
 
 
+def test_profile_that_encloses_nothing_is_a_warning():
+    roof = {"shape": "profile", "profile": {"points_mm": [[10, 20], [18, 0]]}}
+    (line,) = config.parse({"insert": roof, "factors": HEIGHTS}).warnings()
+    assert without_designs(line) == (
+        "insert.profile: a shell without thickness: spheres on its two sides feel each other; "
+        "usual: a line that closes, or that has both ends on the axis"
+    )
+    roof["profile"]["points_mm"] += [[10, 0], [10, 20]]
+    assert config.parse({"insert": roof, "factors": HEIGHTS}).warnings() == []
+
+
 def test_examples_are_one_of_each():
     shapes = {path.stem: shipped_example(path.stem).insert.shape for path in EXAMPLES}
     assert shapes == {name: name for name in (*SHAPES, "profile")} | {"fourth_factor": "cone"}
