@@ -18,8 +18,8 @@ from hopperopt.figures import hopper
 PER_M = 1000.0  # millimetres
 RESOLUTION = 4.0  # pixels per mm of a hopper that is 100 mm wide
 WIDTH = 100.0  # mm
-# Of the hopper's width: room for dimensions on the left, on the right and below, and the step between them.
-LEFT, RIGHT, END, STEP = 0.46, 0.42, 0.05, 0.09
+# Of the hopper's width: room for dimensions on the left, on the right and above, and the step between them.
+LEFT, RIGHT, ABOVE, STEP = 0.46, 0.42, 0.1, 0.09
 
 
 class Outline(NamedTuple):
@@ -102,7 +102,7 @@ def dimensions(walls: Mapping[str, np.ndarray], level: float) -> tuple[list[Dime
             Dimension(-wide, under, wide, under, f"⌀ {2 * wide:.3g} mm", 0, under + 1.3 * text, "middle")
         )
     scale = 2 * widest
-    limits = (-widest - LEFT * scale, widest + RIGHT * scale, -END * scale - step, top + 2 * END * scale)
+    limits = (-widest - LEFT * scale, widest + RIGHT * scale, -step - 2 * text, top + ABOVE * scale)
     return lines, limits
 
 
