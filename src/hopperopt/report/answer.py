@@ -95,7 +95,8 @@ def _objective(name, row, bare):
     ratio = row["simulated"] / other["simulated"] - 1
     change = f", by {percent(abs(ratio))}" if min(row["simulated"], other["simulated"]) > 0 else ""
     if row["verdict"] == "better":
-        return text + f"That is less{change} (one-sided test, p = {row['p_holm']:.2g})."
+        p = f"= {row['p_holm']:.2g}" if row["p_holm"] >= 0.001 else "< 0.001"
+        return text + f"That is less{change} (one-sided test, p {p})."
     if row["verdict"] == "worse":
         return text + f"That is more{change} (one-sided test at {percent(LEVEL)})."
     return text + (
