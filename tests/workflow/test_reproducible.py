@@ -9,7 +9,7 @@ from hopperopt import files
 pytestmark = pytest.mark.slow
 
 # What is recorded of machine and moment.
-RECORDED = {"git", "host", "versions", "created", "wall_time_s", "particle_steps_per_s"}
+RECORDED = {"git", "host", "versions", "created", "history", "wall_time_s", "particle_steps_per_s"}
 SUFFIXES = ("nc", "csv", "yaml", "png", "pdf")
 SURROUNDINGS = {
     "PYTHONHASHSEED": "12345",
