@@ -54,7 +54,7 @@ def of_outflow(mass_fraction: np.ndarray, variance: np.ndarray, target: np.ndarr
 
 
 def residence_order(exit_time: np.ndarray, position: np.ndarray) -> float:
-    """Rank correlation of height at the opening and exit time; NaN with less than two spheres.
+    """Rank correlation of height at the opening and exit time; NaN without two heights and two times.
 
     exit_time (particle,): s, NaN for what stayed and does not count; position (particle, 3): m, at
     the opening.
@@ -62,4 +62,7 @@ def residence_order(exit_time: np.ndarray, position: np.ndarray) -> float:
     from scipy.stats import spearmanr  # slow to import
 
     left = np.isfinite(exit_time)
-    return float(spearmanr(position[left, 2], exit_time[left]).statistic) if left.sum() > 1 else np.nan
+    heights, times = position[left, 2], exit_time[left]
+    if min(np.unique(heights).size, np.unique(times).size) < 2:
+        return np.nan
+    return float(spearmanr(heights, times).statistic)

@@ -57,3 +57,11 @@ def test_residence_order_is_one_for_first_in_first_out():
     exit_time[np.argmin(height)] = np.nan  # the first one stayed
     assert indices.residence_order(exit_time, position) == pytest.approx(1)
     assert np.isnan(indices.residence_order(exit_time * np.nan, position))
+
+
+@pytest.mark.filterwarnings("error")
+def test_order_needs_two_heights_and_two_times():
+    heights = np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.2]])
+    assert np.isnan(indices.residence_order(np.array([0.5, 0.5]), heights))
+    assert np.isnan(indices.residence_order(np.array([0.5, 0.6]), heights[[0, 0]]))
+    assert np.isnan(indices.residence_order(np.array([0.5, np.nan]), heights))
