@@ -15,10 +15,8 @@ OBJECTIVES = tuple(f"J_{name}" for name in OUTPUTS)
 NEAR_BOUND = 0.01  # of a factor's range
 WIDENING = 0.2  # of a factor's range, beyond a bound on which the choice lies
 DRAWS = 1000  # for the gain over the plan's centre
-CHOICES, CANDIDATES = (
-    100,
-    256,
-)  # draws of which one is chosen each; designs for that, beside the front's (power of 2)
+CHOICES = 100  # draws of which one is chosen each
+CANDIDATES = 256  # designs for that, beside the front's (power of 2)
 LIMITS = (0.05, 0.95)  # quantiles: an interval of 90 %
 
 

@@ -16,10 +16,9 @@ from hopperopt import heartbeat
 from hopperopt.heartbeat import Beat
 from hopperopt.progress import duration
 
-SILENT = {
-    "starting": 600.0
-}  # s without a beat, after which a simulation may have ended: it may be compiling,
-SILENT_LATER = 60.0  # and beats every few seconds from its first step on
+# Time (s) without a beat after which a simulation may have ended: at the start it may be compiling, later it
+# beats every few seconds.
+SILENT, SILENT_LATER = {"starting": 600.0}, 60.0
 REDRAW = 2.0  # s
 BAR = 24  # characters
 CLEAR = "\x1b[H\x1b[J"

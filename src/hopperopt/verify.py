@@ -29,7 +29,7 @@ def verify(
     files.InputError naming the runs that did not end well, unless they are to be dropped; a case without any
     run left has empty cells.
     """
-    runs = dataset.read_runs(simulations)
+    runs = dict(dataset.read_runs(simulations))  # each is asked for several times
     unusable = dataset.unusable_runs(runs)
     if unusable and params["incomplete"] != "drop":
         raise files.InputError(dataset.refusal(unusable))

@@ -84,6 +84,18 @@ def test_the_verdict_has_a_row_per_case_and_objective(study):
     assert ((verdict["low"] < 0) & (verdict["high"] > 0)).all()
 
 
+def test_each_run_is_read_once(study, monkeypatch):
+    read = []
+
+    def counted(path, original=files.read_netcdf):
+        read.append(path)
+        return original(path)
+
+    monkeypatch.setattr(files, "read_netcdf", counted)
+    tables(study)
+    assert sorted(read) == sorted(study.glob("*_rep_*.nc"))
+
+
 def test_z_counts_the_errors_of_both(study):
     """Worse than predicted is positive; the network's error makes the same departure a smaller one."""
     alone, _ = tables(study)

@@ -87,7 +87,7 @@ def report(
         surrogate=files.read_netcdf(surrogate),
         undetectable=choice.undetectable(choice.squared_errors(files.read_netcdf(comparison))),
         plan={key: run.drop_dims(run.dims) for key, run in dataset.read_runs(simulations).items()},
-        verification=dict(dataset.read_runs(verification).items()),
+        verification=dict(dataset.read_runs(verification)),
     )
     text = render(study, params["settings"], params["case_of"], {Path(p).stem: p for p in figures})
     with files.atomic(output) as temporary:
