@@ -234,7 +234,7 @@ def _run(study, folder):
     try:
         dataset.gather(
             {"factors": list(design), "incomplete": "refuse"},
-            folder / "design.csv",
+            [folder / "design.csv"],
             [folder / f"{name}_rep_1.nc"],
             folder / "dataset.nc",
             folder / "runs.csv",

@@ -42,7 +42,7 @@ def mistakes(study, faulty):
     rules = (
         ("keys", SIMULATED | {"factors"}, _factor_keys),
         ("plan", {"factors", "design"}, _plan),
-        ("runs", {"design", "verification", "plan", "keys"}, _runs),
+        ("runs", {"design", "infill", "verification", "plan", "keys"}, _runs),
         ("network", {"surrogate", "design", "plan", "keys"}, _network),
         ("explicit", {"factors", "optimise"}, _explicit),
         ("cases", {"factors", "verification"}, _cases),
@@ -115,12 +115,17 @@ def _plan(study):
 
 
 def _runs(study):
-    """The plan and the verification have no more runs than Snakemake can take."""
+    """Plan, infill and verification have no more runs each than Snakemake can take."""
     verification = study.verification
     numbers = {"design.replicates": (study.design.replicates, study.plan)}
     numbers["verification.replicates"] = (verification.replicates, verification.cases)
     for name, replicates in verification.replicates_of.items():
         numbers[f"verification.replicates_of.{name}"] = (replicates, verification.cases)
+    proposed = sum(map(len, study.proposals()))
+    if proposed * study.design.replicates > MOST_RUNS:
+        allowed = f"at most {MOST_RUNS // proposed} for {proposed} designs of infill ({MOST_RUNS} runs)"
+        yield mistake("design.replicates", study.design.replicates, allowed)
+        return
     for key, (replicates, designs) in numbers.items():
         if len(designs) * replicates > MOST_RUNS:
             allowed = f"at most {MOST_RUNS // len(designs)} for {len(designs)} designs ({MOST_RUNS} runs)"
@@ -194,7 +199,7 @@ def _names(study):
     """No case bears the name of an experiment, whose seeds it would share, or of what another case is."""
     verification, taken = study.verification, {name for name, _ in study.experiments()}
     for name, case in verification.cases.items():
-        if name in taken or re.fullmatch(r"exp_\d+", name):
+        if name in taken or re.fullmatch(r"exp_\d+", name) or name.startswith(plans.PROPOSED):
             yield mistake(f"verification.cases.{name}", name, "a name that no experiment has")
         elif name in verification.words and case != name:
             yield mistake(f"verification.cases.{name}", case, f"{name} (a case of this name is that)")

@@ -46,7 +46,7 @@ STAGES = {
     "gather": Stage(
         "dataset",
         "gather",
-        ("design", "simulations*"),
+        ("design*", "simulations*"),
         ("dataset.nc", "runs.csv", "designs.csv"),
         "gather the plan's runs",
     ),
@@ -72,7 +72,7 @@ STAGES = {
     "choose": Stage(
         "surrogate.choice",
         "choose",
-        ("training", "network", "validation*"),
+        ("training", "network*", "validation*"),
         ("model.nc",),
         "choose the surrogate and fit it",
     ),
@@ -89,6 +89,13 @@ STAGES = {
         ("surrogate",),
         ("front.csv", "history.nc", "selected.yaml"),
         "search the best designs and select one",
+    ),
+    "propose": Stage(
+        "infill",
+        "propose",
+        ("surrogate", "plan", "front"),
+        ("proposals.csv",),
+        "propose the designs of a round of infill",
     ),
     "verify": Stage(
         "verify",

@@ -474,6 +474,17 @@ class Design(Model):
     csv: OwnPlan = OwnPlan()
 
 
+class Infill(Model):
+    """Designs that are simulated after the plan, where its surrogate expects most of them."""
+
+    rounds: Annotated[int, Number(least=0, most=100)] = 0
+    """Rounds; in each, designs are proposed from all that is simulated, and simulated as often as the
+    plan's."""
+    batch: Annotated[int, Number(least=1, most=100)] = 4
+    """Designs of a round: the one selected from the front, and those of the largest expected improvement of
+    its hypervolume."""
+
+
 class Validation(Model):
     """The comparison of the surrogates, each experiment left out once."""
 
@@ -628,6 +639,7 @@ class Study(Setup):
     factors: Annotated[dict[Name, Factor], Field(min_length=1)] = Field(default_factory=_paper_factors)
     """What the designs vary, by name."""
     design: Design = Design()
+    infill: Infill = Infill()
     surrogate: Surrogate = Surrogate()
     optimise: Optimise = Optimise()
     verification: Verification = Verification()
@@ -670,6 +682,11 @@ class Study(Setup):
     def experiments(self):
         """(name, design) of each experiment of the plan, in its order."""
         return [(experiment.name, experiment.design) for experiment in self.plan]
+
+    def proposals(self):
+        """Names of the designs of each round of infill, from the first on: a list for each."""
+        infill = self.infill
+        return [plans.proposals(number, infill.batch) for number in range(1, infill.rounds + 1)]
 
     def cases(self):
         """Verification cases by name: a word of DERIVED (to be found), a design, or None (no insert)."""
@@ -739,6 +756,24 @@ STAGES = {
         "explicit": study.optimise.explicit if study.optimise.select == "explicit" else None,
         "bounds": {name: list(plans.bounds(levels)) for name, levels in study.levels.items()},
         "centre": plans.centre(study.levels),
+    },
+    # Rounds of infill follow Gaussian processes, whatever surrogate the study goes on with: clip and split
+    # are nothing to these.
+    "infill_filter": lambda study: {
+        "factors": list(study.factors),
+        "clip_sigma": None,
+        "split": "points",
+        "validation_experiments": 1,
+        "test_experiments": 1,
+        "seed": study.surrogate.seed,
+    },
+    "infill_model": lambda study: {"model": "gaussian", "seed": study.surrogate.seed},
+    "infill_front": lambda study: study.stage_params("optimise") | {"select": "knee", "explicit": None},
+    "propose": lambda study: {
+        "bounds": {name: list(plans.bounds(levels)) for name, levels in study.levels.items()},
+        "replicates": study.design.replicates,
+        "seed": study.optimise.seed,
+        "derived": study.derived_params("propose", 1),
     },
     "verify": lambda study: {
         "cases": [

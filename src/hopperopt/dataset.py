@@ -44,11 +44,12 @@ def write_plan(params: Mapping, output: str | os.PathLike) -> None:
 
 
 def gather(
-    params: Mapping, design: str | os.PathLike, simulations: Iterable, output: str, runs: str, designs: str
+    params: Mapping, design: Iterable, simulations: Iterable, output: str, runs: str, designs: str
 ) -> None:
-    """Write the plan's dataset (netCDF), a table of its runs and one of its designs (CSV).
+    """Write the dataset (netCDF) of plan and rounds of infill, a table of its runs, one of its designs (CSV).
 
-    params: `factors`, names of columns of the table `design`; `incomplete`, refuse or drop.
+    params: `factors`, names of columns of the tables `design`, the plan's first and then one for each round;
+    `incomplete`, refuse or drop.
     simulations: the runs' files, named EXPERIMENT_rep_REPLICATE.nc. Raises files.InputError naming the runs
     that did not end well, unless they are to be dropped: then they are NaN in the dataset (InputError if none
     is left).
@@ -60,8 +61,8 @@ def gather(
     unusable = unusable_runs(ends)
     if unusable and params["incomplete"] != "drop":
         raise files.InputError(refusal(unusable))
-    plan = files.read_table(design, "experiment", *params["factors"])
-    plan = plan.set_index("experiment")[list(params["factors"])]
+    tables = [files.read_table(path, "experiment", *params["factors"]) for path in design]
+    plan = pd.concat(tables).set_index("experiment")[list(params["factors"])]
     dataset = assemble(plan, simulated, unusable)
     files.write_netcdf(dataset, output)
     files.write_table(table_of_runs(dataset), runs)
@@ -281,7 +282,7 @@ def _described(dataset: xr.Dataset, unusable: Mapping) -> xr.Dataset:
     dropped = [f"{name}_rep_{replicate}: {reason}" for (name, replicate), reason in unusable.items()]
     return dataset.assign_attrs(
         Conventions=CONVENTIONS,
-        title="Outflow of the hopper in the experiments of the plan",
+        title="Outflow of the hopper in the experiments",
         source="discrete element simulations",
         dropped_runs="; ".join(dropped),
     )

@@ -13,6 +13,7 @@ from hopperopt.quantity import Quantity
 
 MOST_EXPERIMENTS = 10_000
 NAME = re.compile(r"[a-z][a-z0-9_]*")
+PROPOSED = "infill_"  # begins the names of the designs of infill
 
 # Columns, dimensions and variables of the study's files, which no factor may be called.
 # fmt: off
@@ -24,7 +25,7 @@ RESERVED = {
     "max_energy_gain", "lost_particles", "residual_count", "residual_mass_fraction", "step_count",
     "filling_level_mm", "moved", "clip_low", "clip_high", "target_clipped", "runs", "scatter_variance",
     "pooled_variance", "rank", "n", "against_bare", "fine", "fine_low", "fine_high", "intermediate",
-    "intermediate_low", "intermediate_high",
+    "intermediate_low", "intermediate_high", "chosen_as", "expected_improvement",
 }
 # fmt: on
 
@@ -112,6 +113,11 @@ def names(count):
     return [f"exp_{number:02d}" for number in range(1, count + 1)]
 
 
+def proposals(number, count):
+    """infill_2_1, infill_2_2, ...: so many designs of a round of infill, 2."""
+    return [f"{PROPOSED}{number}_{place}" for place in range(1, count + 1)]
+
+
 def from_csv(text, factors):
     """An own plan: a column `experiment` and one for each factor.
 
@@ -144,6 +150,8 @@ def _from_row(number, row, factors):
     name = (row["experiment"] or "").strip()
     if not NAME.fullmatch(name):
         raise NotAllowed(f"names of small letters, digits and underscores (line {number} has {name!r})")
+    if name.startswith(PROPOSED):
+        raise NotAllowed(f"names that do not begin with {PROPOSED} (line {number} has {name!r})")
     design = {}
     for factor in factors:
         try:

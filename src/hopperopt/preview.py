@@ -66,9 +66,13 @@ def _runs(study):
     plan, again = len(study.plan), sum(map(study.verification.replicates_in, cases))
     parts = ", ".join(f"{name} {study.verification.replicates_in(name)}" for name in cases)
     each = f"{fillings} {'filling' if fillings == 1 else 'fillings'} of each"
+    infill = fillings * sum(map(len, study.proposals()))
+    infilled = (
+        f"{infill} of infill ({study.infill.rounds} x {study.infill.batch} designs), " if infill else ""
+    )
     return {
         "plan": f"{study.design.plan}, {plan} designs of {', '.join(study.factors)}, {each}",
-        "simulations": f"{plan * fillings + again}: {plan * fillings} of the plan, "
+        "simulations": f"{plan * fillings + infill + again}: {plan * fillings} of the plan, {infilled}"
         f"{again} of the verification ({parts})",
     }
 
@@ -107,13 +111,13 @@ def _time_step(designs):
 
 
 def _cost(study, designs):
-    """Expected time and memory; verification runs of designs yet to be found cost the plan's mean."""
+    """Expected time and memory; runs of designs yet to be found cost the plan's mean."""
     plan = len(study.plan)
     interval = study.simulation.snapshot_interval_s
     costs = [cost.expected(setup.case(labels, 0), interval) for _, labels, setup in designs.known]
     of_name = {name: each for (name, *_), each in zip(designs.known, costs, strict=True)}
     mean = np.mean([each.seconds for each in costs[:plan]], axis=0)
-    total = plan * study.design.replicates * mean
+    total = (plan + sum(map(len, study.proposals()))) * study.design.replicates * mean
     for name in study.verification.cases:
         each = of_name[name].seconds if name in of_name else mean
         total = total + study.verification.replicates_in(name) * np.array(each)

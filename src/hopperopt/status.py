@@ -40,7 +40,7 @@ DONE, RUNNING, LOST, OTHER, WAITING = "done", "running", "lost", "other", "waiti
 class Run(NamedTuple):
     """A simulation of the study."""
 
-    purpose: str  # "plan" or "verification"
+    purpose: str  # "plan", "infill" or "verification"
     file: Path
     case: str | None  # JSON; None where the study has yet to find the design
 
@@ -74,6 +74,9 @@ def planned(study) -> list[Run]:
 
     for name, design in study.experiments():
         add("plan", "simulations", name, design, study.design.replicates)
+    for number, names in enumerate(study.proposals(), start=1):
+        for name in names:
+            add("infill", f"infill/round_{number}", name, name, study.design.replicates)
     for name, design in study.cases().items():  # a word where the study finds the design
         add("verification", "verification", name, design, study.verification.replicates_in(name))
     return runs
@@ -160,7 +163,7 @@ def screen(runs: Sequence[Run], seen: Seen, results: Path, figures: Iterable[Pat
     head = [
         f"{results.resolve()}, {time.strftime('%H:%M:%S')}",
         "",
-        *(_counts(purpose, runs, seen) for purpose in ("plan", "verification")),
+        *(_counts(purpose, runs, seen) for purpose in dict.fromkeys(run.purpose for run in runs)),
         f"{'results':13}{'   '.join(made)}",
         "",
     ]

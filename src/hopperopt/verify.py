@@ -15,6 +15,7 @@ from hopperopt.uncertainty import SIGMAS, Estimate
 from hopperopt.verdict import COLUMNS, NONE, Case, Prediction, judge
 
 PLAN_BEST = "plan_best"
+SMALLEST = {"best_f": "J_fine", "best_i": "J_intermediate", PLAN_BEST: "rank"}  # picks a row of a table
 DRAWS = 1000  # of the surrogate, for the limits of what it predicts
 
 
@@ -49,15 +50,23 @@ def verify(
 
 
 def found_design(kind: str, path: str | os.PathLike, factors: Iterable[str]) -> dict[str, float]:
-    """The design, by factor, that a verification case gets from a result of the study.
+    """The design, by factor, that a simulation gets from a result of the study.
 
-    kind: selected (path: selected.yaml), best_f or best_i (front.csv), plan_best (designs.csv).
+    kind: selected (path: selected.yaml), best_f or best_i (front.csv), plan_best (designs.csv), or the name
+    of a design of infill (proposals.csv). Raises files.InputError where a proposal is not in the table.
     """
     if kind == "selected":
         return files.read_yaml(path, "design")["design"]
-    by = {"best_f": "J_fine", "best_i": "J_intermediate", PLAN_BEST: "rank"}[kind]
-    table = files.read_table(path, by, *factors)
-    return {name: float(table.loc[table[by].idxmin(), name]) for name in factors}
+    if (by := SMALLEST.get(kind)) is None:
+        table = files.read_table(path, "experiment", *factors)
+        table = table[table["experiment"] == kind]
+        if table.empty:
+            raise files.InputError(f"{path}: has no {kind}")
+        row = table.index[0]
+    else:
+        table = files.read_table(path, by, *factors)
+        row = table[by].idxmin()
+    return {name: float(table.loc[row, name]) for name in factors}
 
 
 def predict(predictor: prediction.Predictor, design: Mapping[str, float], seed: int) -> Prediction:

@@ -33,17 +33,28 @@ def study(tmp_path, make_run):
     return tmp_path
 
 
-def gather(study, **params):
-    simulations = sorted(study.glob("exp_*.nc"), reverse=True)
+def gather(study, designs=("design.csv",), **params):
+    simulations = sorted(study.glob("*_rep_*.nc"), reverse=True)
     dataset.gather(
         PARAMS | params,
-        study / "design.csv",
+        [study / name for name in designs],
         simulations,
         study / "dataset.nc",
         study / "runs.csv",
         study / "designs.csv",
     )
     return files.read_netcdf(study / "dataset.nc")
+
+
+def test_rounds_of_infill_follow_the_plan(study, make_run):
+    proposed = PLAN.iloc[:1].assign(experiment="infill_1_1", theta_deg=52.25, chosen_as="selected")
+    files.write_table(proposed, study / "proposals.csv")
+    for replicate in (1, 2):
+        files.write_netcdf(make_run(seed=replicate), study / f"infill_1_1_rep_{replicate}.nc")
+    data = gather(study, designs=("design.csv", "proposals.csv"))
+    assert list(data["experiment"].values) == [*PLAN["experiment"], "infill_1_1"]
+    assert float(data.sel(experiment="infill_1_1")["theta_deg"]) == 52.25
+    assert set(files.read_table(study / "designs.csv")["experiment"]) == set(data["experiment"].values)
 
 
 def spoil(study, make_run, name, **changes):

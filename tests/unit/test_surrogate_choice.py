@@ -70,7 +70,8 @@ def chosen(synthetic, tmp_path):
         compared["simulated_J"] = (("experiment", "output"), np.zeros((25, 2)))
         files.write_netcdf(xr.Dataset(compared, {"surrogate": names}), tmp_path / "validation.nc")
         validation = [tmp_path / "validation.nc"] if model == "auto" else []
-        paths = tmp_path / "training.nc", tmp_path / "network.nc", validation, tmp_path / "model.nc"
+        networks = [] if model == "gaussian" else [tmp_path / "network.nc"]
+        paths = tmp_path / "training.nc", networks, validation, tmp_path / "model.nc"
         choice.choose(PARAMS | {"model": model}, *paths)
         return prediction.load(paths[-1]), files.read_netcdf(paths[-1]).attrs
 

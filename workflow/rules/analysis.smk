@@ -24,7 +24,7 @@ rule sensitivity:
     """Sobol' indices of the surrogate's objectives and of the discharge time."""
     input:
         surrogate=result("surrogate/model.nc"),
-        dataset=result("dataset.nc"),
+        dataset=all_data(),
     output:
         sobol=report(result("analysis/sobol.csv"), caption="../report/sobol.rst", category="Tables"),
     log:

@@ -31,7 +31,16 @@ EXPERIMENTS = list(DESIGNS)
 REPLICATES = range(1, STUDY.design.replicates + 1)
 CASES = STUDY.cases()
 SIMULATION = cli.SIMULATION if STUDY.simulation.snapshot_interval_s is None else cli.RECORDED
-SAMPLE = EXPERIMENTS[:: math.ceil(len(EXPERIMENTS) / 100)]  # what stands for all of a large plan
+PROPOSALS = STUDY.proposals()  # of each round of infill
+
+
+def some(names):
+    """At most a hundred of the names, to stand for all of a large plan."""
+    return names[:: math.ceil(len(names) / 100)]
+
+
+SAMPLE = some(EXPERIMENTS)
+LEFT_OUT = some(EXPERIMENTS + sum(PROPOSALS, []))  # one at a time, in the surrogates' validation
 
 
 def result(path):
@@ -65,9 +74,13 @@ def as_json(settings, module):
     return json.dumps({**settings, "code": code(module)}, sort_keys=True)
 
 
+# Stages whose settings differ in a round of infill.
+INFILL = {"infill_filter": "filter", "infill_model": "choose", "infill_front": "optimise"}
+
+
 def stage(name):
     """Parameters of a stage."""
-    return as_json(STUDY.stage_params(name), cli.STAGES[name].module)
+    return as_json(STUDY.stage_params(name), cli.STAGES[INFILL.get(name, name)].module)
 
 
 def fold_params(wildcards):
@@ -78,7 +91,7 @@ def fold_params(wildcards):
 
 def validation_folds():
     """Files of the surrogates' validation, one for each experiment; each trains them all anew."""
-    return expand(result("surrogate/validation/{experiment}.nc"), experiment=SAMPLE)
+    return expand(result("surrogate/validation/{experiment}.nc"), experiment=LEFT_OUT)
 
 
 def compared_surrogates():
@@ -171,6 +184,48 @@ def verification_runs(case):
     """Files of a verification case's runs."""
     replicates = range(1, STUDY.verification.replicates_in(case) + 1)
     return expand(result("verification/{case}_rep_{replicate}.nc"), case=case, replicate=replicates)
+
+
+def of_round(number, name):
+    """A file of a round of infill; round 0 is the plan."""
+    return result(f"infill/round_{number}/{name}")
+
+
+def dataset_after(number):
+    """The data set of the plan and the rounds of infill up to a number."""
+    return of_round(number, "dataset.nc") if int(number) else result("dataset.nc")
+
+
+def all_data():
+    """The data set of all that is simulated before the verification."""
+    return dataset_after(len(PROPOSALS))
+
+
+def proposals_to(number):
+    """Tables of the designs of all rounds up to a number."""
+    return [of_round(before, "proposals.csv") for before in range(1, int(number) + 1)]
+
+
+def infill_runs(number):
+    """Files of all runs of the rounds of infill up to a number."""
+    runs = [
+        expand(of_round(before, "{name}_rep_{replicate}.nc"), name=names, replicate=REPLICATES)
+        for before, names in enumerate(PROPOSALS[: int(number)], start=1)
+    ]
+    return sum(runs, [])
+
+
+def infill_params(wildcards):
+    """Parameters of a simulation of a round; all but the design, which is in the round's table."""
+    settings = STUDY.derived_params(wildcards.proposal, int(wildcards.replicate))
+    return as_json(settings | {"found": wildcards.proposal}, SIMULATION)
+
+
+def proposal_params(wildcards):
+    """Parameters of the stage that proposes the designs of a round."""
+    number = int(wildcards.round)
+    settings = STUDY.stage_params("propose") | {"round": number, "names": PROPOSALS[number - 1]}
+    return as_json(settings, cli.STAGES["propose"].module)
 
 
 def shown_case():

@@ -147,7 +147,7 @@ rule figure_front:
     """Pareto front with the selected point, among what was simulated."""
     input:
         front=result("optimum/front.csv"),
-        dataset=result("dataset.nc"),
+        dataset=all_data(),
         verdict=result("verification/verdict.csv"),
     output:
         png=report(result("figures/front.png"), caption="../report/front.rst", category="Figures"),

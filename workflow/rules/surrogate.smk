@@ -1,7 +1,7 @@
 rule filter:
     """Targets of the surrogate: split, and clipped where they train."""
     input:
-        dataset=result("dataset.nc"),
+        dataset=all_data(),
     output:
         training=result("surrogate/training.nc"),
     log:
@@ -43,6 +43,8 @@ rule validate_fold:
         training=result("surrogate/training.nc"),
     output:
         fold=result("surrogate/validation/{experiment}.nc"),
+    wildcard_constraints:
+        experiment=one_of(LEFT_OUT),
     log:
         log_of("validate_fold/{experiment}"),
     params:

@@ -20,6 +20,8 @@ IMPOSSIBLE = {"color": NETWORK, "marker": "o", "markersize": 2.5, "markerfacecol
 PREDICTED = {"color": NETWORK, "marker": "o", "markersize": 3.5}
 SIMULATED = {"color": style.INK, "marker": "D", "markersize": 4, "markerfacecolor": "white"}
 PLAN = {"color": "#909090", "marker": "o", "markersize": 2.8, "markerfacecolor": "none"}
+INFILL = {"color": "#0072B2", "marker": "^", "markersize": 3.2, "markerfacecolor": "none"}
+PROPOSED = "infill_"  # begins the names of the designs of infill
 ARROW = {"arrowstyle": "->", "linewidth": 0.6, "color": style.INK, "shrinkB": 3}
 
 
@@ -39,10 +41,10 @@ def write(
 def draw(front: pd.DataFrame, dataset: xr.Dataset, verdict: pd.DataFrame) -> Figure:
     """Draw J_i over J_f: the front as predicted, and the same among the simulations.
 
-    front: columns J_fine, J_intermediate, feasible, selected and the factors; dataset: the plan's
-    data set; verdict: a row per verification case and objective. Simulated objectives are sign(U) sqrt|U|,
-    below zero where a curve departs less from the batch than noise alone does on average. An arrow leads from
-    a case's prediction to its simulation; bars are intervals of 90 %.
+    front: columns J_fine, J_intermediate, feasible, selected and the factors; dataset: that of the plan and
+    of the rounds of infill; verdict: a row per verification case and objective. Simulated objectives are
+    sign(U) sqrt|U|, below zero where a curve departs less from the batch than noise alone does on average. An
+    arrow leads from a case's prediction to its simulation; bars are intervals of 90 %.
     """
     figure = style.page(style.PAGE, 78)
     near, far = style.panels(figure, 1, 2, style.Frame(15, 3.5, 8.5, 10), (17, 0))[0]
@@ -52,14 +54,18 @@ def draw(front: pd.DataFrame, dataset: xr.Dataset, verdict: pd.DataFrame) -> Fig
         panel.locator_params(nbins=6)
         _draw_front(panel, front)
     _label_selected(near, front)
-    _draw_simulated(far, front, _plan_objectives(dataset), verdict)
-    style.key(figure, _meanings(front), (2, 77))
+    proposed = dataset["experiment"].str.startswith(PROPOSED)
+    groups = [(PLAN, dataset.isel(experiment=~proposed)), (INFILL, dataset.isel(experiment=proposed))]
+    _draw_simulated(far, front, [(look, _objectives(data)) for look, data in groups], verdict)
+    style.key(figure, _meanings(front, proposed.any()), (2, 77))
     return figure
 
 
-def _meanings(front):
+def _meanings(front, infill):
     """What lines and marks mean, see style.key."""
     marks = {"prediction of a case": PREDICTED, "case, simulated": SIMULATED, "plan, simulated": PLAN}
+    if infill:
+        marks["infill, simulated"] = INFILL
     if not front["feasible"].all():
         marks = {"impossible mass fractions": IMPOSSIBLE, **marks}
     if front["selected"].any():
@@ -83,13 +89,15 @@ def _label_selected(panel, front):
         labels.at_points(panel, {text: tuple(row[COLUMNS])}, _along(front[COLUMNS].to_numpy(float)))
 
 
-def _draw_simulated(panel, front, plan, verdict):
-    """Draw the plan's experiments and the verification cases, with labels."""
+def _draw_simulated(panel, front, groups, verdict):
+    """Draw the experiments, (look, objectives) of each group, and the verification cases, with labels."""
     for line in (panel.axhline, panel.axvline):
         line(0, color=style.FAINT, linewidth=0.5, zorder=0)
-    panel.plot(*plan, linestyle="", zorder=1, **PLAN)
+    for look, objectives in groups:
+        panel.plot(*objectives, linestyle="", zorder=1, **look)
     # A mark that is covered is worse than a line that is touched.
-    places, lines = {}, [np.repeat(plan.T, 4, axis=0), _along(front[COLUMNS].to_numpy(float))]
+    marks = np.hstack([objectives for _, objectives in groups])
+    places, lines = {}, [np.repeat(marks.T, 4, axis=0), _along(front[COLUMNS].to_numpy(float))]
     panel.autoscale_view()
     lines += [_along([(x, 0) for x in panel.get_xlim()]), _along([(0, y) for y in panel.get_ylim()])]
     for case in dict.fromkeys(verdict["case"]):
@@ -124,7 +132,7 @@ def _along(line):
     return np.column_stack([np.interp(at, np.arange(len(line)), values) for values in line.T])
 
 
-def _plan_objectives(dataset):
-    """Objectives sign(U) sqrt|U| of the plan's designs, (output, experiment)."""
+def _objectives(dataset):
+    """Objectives sign(U) sqrt|U| of the designs, (output, experiment)."""
     U = dataset["U_design"].sel(size_class=list(features.OUTPUTS)).transpose("size_class", "experiment")
     return outflow.signed_root(U.values)

@@ -26,16 +26,16 @@ log = logging.getLogger(__name__)
 def choose(
     params: Mapping,
     training: str | os.PathLike,
-    network: str | os.PathLike,
+    network: Sequence[str | os.PathLike],
     validation: Sequence[str | os.PathLike],
     output: str | os.PathLike,
 ) -> None:
     """Write surrogate/model.nc: the surrogate named, or for `auto` the one that compares best.
 
     params: `model` (paper, network, ensemble, gaussian or auto); for networks `hidden_nodes` (list),
-    `starts`, `selected_hidden_nodes` and `seed`. training, network: paths of training.nc and network.nc;
-    validation: the path of validation.nc for auto, else none. With `auto` a warning names the objectives in
-    which no candidate beats the mean of the experiments.
+    `starts`, `selected_hidden_nodes` and `seed`. training: path of training.nc; network: that of
+    network.nc, which `gaussian` does without; validation: that of validation.nc for auto, else none. With
+    `auto` a warning names the objectives in which no candidate beats the mean of the experiments.
     """
     data, name, chosen = read_netcdf(training), params["model"], "given"
     clip = CLIPPED if np.isfinite(data.attrs["clip_sigma"]) else ""
@@ -48,17 +48,19 @@ def choose(
     elif name != "gaussian":
         name = {"paper": "network"}.get(name, name) + clip
     if name == f"network{clip}":  # that of the stage `train`, with all that it says of itself
-        write_netcdf(read_netcdf(network).assign_attrs(surrogate=name, chosen=chosen), output)
+        write_netcdf(read_netcdf(network[0]).assign_attrs(surrogate=name, chosen=chosen), output)
         return
     predictor = prediction.Predictor(
         tuple(data.attrs["factors"].split()),
         data["M"].values,
         data["target_fraction"].values,
         _fitted(name, data, params),
-        prediction.load(network).objective_error,
     )
-    if name != "network":
-        predictor = predictor._replace(objective_error=_spread(predictor, data, params["seed"]))
+    if name == "network":
+        error = prediction.load(network[0]).objective_error
+    else:
+        error = _spread(predictor, data, params["seed"])
+    predictor = predictor._replace(objective_error=error)
     attributes = {"title": f"surrogate of the outflow: {name}", "surrogate": name, "chosen": chosen}
     prediction.save(output, predictor, {}, attributes | {"seed": params["seed"]})
 

@@ -76,6 +76,19 @@ class Gaussian(NamedTuple):
         curves = np.einsum("cdn,dcom->dnom", np.stack(scores), components)
         return self.mean + normal(1, self.mean_variance) + curves + normal(len(inputs), self.rest)
 
+    @one_thread
+    def believing(self, design: np.ndarray, runs: int) -> "Gaussian":
+        """The processes as if so many runs of a design (factors,) had shown what is predicted there."""
+        scores = [process.predict(self._scaled(design)) for process in self._processes()]
+        designs = np.vstack([self.designs, design])
+        widths = range_scaling(self.designs).scale / range_scaling(designs).scale
+        return self._replace(
+            designs=designs,
+            noise=np.append(self.noise, 1 / runs),
+            scores=np.vstack([self.scores, np.ravel(scores)]),
+            lengths=self.lengths * widths,
+        )
+
     def _scaled(self, designs):
         return range_scaling(self.designs).normalise(np.atleast_2d(np.asarray(designs, dtype=float)))
 
