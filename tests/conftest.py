@@ -18,7 +18,7 @@ provenance.use_numba_cache()
 @pytest.fixture(scope="session")
 def make_report_study():
     """Function that returns the report's Study, of runs made without a simulation, and its cases."""
-    from hopperopt import config, dataset, outflow
+    from hopperopt import config, dataset, effects, outflow
     from hopperopt.report import page
 
     rng = np.random.default_rng(1)
@@ -72,10 +72,12 @@ def make_report_study():
         validation = pd.DataFrame(
             {"method": ["gaussian", "mean_curve"], **methods, "objective_i_rmse": 0.01, "coverage_90": 0.9}
         )
+        data = dataset.assemble(table, plan, {}).assign_attrs(next(iter(plan.values())).attrs)
         made = page.Study(
             kinds=dict(params["cases"]),
             keys=params["derived"]["keys"],
-            data=dataset.assemble(table, plan, {}).assign_attrs(next(iter(plan.values())).attrs),
+            data=data,
+            effects=effects.main_effects(data, list(designs[next(iter(designs))])),
             selected={"design": centre, "rule": "knee", "warning": None},
             front=front,
             verdict=verdict,

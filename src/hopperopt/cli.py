@@ -109,6 +109,7 @@ STAGES = {
         "report",
         (
             "dataset",
+            "effects",
             "validation",
             "comparison",
             "surrogate",
@@ -138,7 +139,7 @@ FIGURES = {
     "sensitivity": ("sobol",),
 }
 # Those that the report shows as they are; of the others it has drawings of its own.
-REPORTED = [name for name in FIGURES if name not in ("hopper", "curves")]
+REPORTED = [name for name in FIGURES if name not in ("hopper", "curves", "effects")]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -53,11 +53,13 @@ def scaled_designs(data: xr.Dataset, factors) -> np.ndarray:
 def main_effects(data: xr.Dataset, factors) -> pd.DataFrame:
     """J = sign(U) sqrt|U| of the mean U at each level of each factor, with the noise's interval of 90 %.
 
+    `experiments`: names of the designs whose mean it is.
     A factor whose levels the plan does not repeat has bins of equally many designs instead, named by the mean
     value of each.
     """
     U = data[["U_design", "U_design_variance"]].transpose("experiment", "size_class")
     rows = []
+    names = data["experiment"].values
     for factor in factors:
         values = data[factor].values
         groups = _groups(values)
@@ -70,8 +72,9 @@ def main_effects(data: xr.Dataset, factors) -> pd.DataFrame:
                 part["U_design"].values.mean(), part["U_design_variance"].values.sum() / len(group) ** 2
             )
             J, low, high = map(outflow.signed_root, (mean.square, *mean.interval()))
-            rows.append([factor, values[group].mean(), name, J, low, high])
-    return pd.DataFrame(rows, columns=["factor", "level", "objective", "J", "J_low", "J_high"])
+            rows.append([factor, values[group].mean(), name, J, low, high, " ".join(names[group])])
+    columns = ["factor", "level", "objective", "J", "J_low", "J_high", "experiments"]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def _groups(values):

@@ -50,9 +50,14 @@ def browser():
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory, make_report_study):
+def made(make_report_study):
+    return make_report_study()
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory, made):
     path = tmp_path_factory.mktemp("report") / "report.html"
-    study, case_of = make_report_study()
+    study, case_of = made
     path.write_text(page.render(study, {}, case_of, {}), encoding="utf-8")
     return path
 
@@ -128,6 +133,24 @@ def test_another_size_has_other_curves(opened):
         seen.append(tuple(all_of(browser, "#curve-chart .curve", "d")))
         assert f"{name} particles" in text_of(browser, "#curve-chart")
     assert len(set(seen)) == 3 and all(len(paths) == 25 for paths in seen)
+
+
+def test_a_level_of_a_factor_shows_its_effect(opened, made):
+    from selenium.webdriver import Keys
+
+    browser, lengths = opened(), made[0].effects.query("factor == 'length_mm'")
+    for size in ("fine", "intermediate"):
+        browser.find_element("css selector", f"#effect-sizes input[value={size}]").click()
+        for n, row in enumerate(lengths.query("objective == @size").itertuples(), start=1):
+            move_to(browser, f"#effect-charts .chart:nth-child(2) .effect:nth-of-type({n})")
+            told = text_of(browser, "#effect")
+            J, low, high = (f"{value:.4f}".replace("-", "−") for value in (row.J, row.J_low, row.J_high))
+            assert f"length {row.level:g} mm: J of the {size} particles {J} ({low} to {high})" in told
+            assert told.endswith("mean of 5 experiments, " + row.experiments.replace(" ", ", "))
+            (current,) = all_of(browser, "#effect-charts .current", "aria-label")
+            assert current == f"length {row.level:g} mm"
+    browser.find_element("css selector", "#effect-charts .current").send_keys(Keys.ARROW_RIGHT)
+    assert all_of(browser, "#effect-charts .current", "aria-label") == ["height 26 mm"]
 
 
 def test_a_point_of_the_front_shows_its_design(opened):

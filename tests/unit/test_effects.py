@@ -31,6 +31,7 @@ def plan(designs, fine, intermediate=None, variance=1e-10, runs=3):
         },
         coords={
             "size_class": ["fine", "intermediate"],
+            "experiment": [f"exp_{number:02d}" for number in range(1, len(U) + 1)],
             **{name: ("experiment", values) for name, values in zip(LEVELS, designs.T, strict=True)},
         },
     )
@@ -55,6 +56,16 @@ def test_effects_are_means_of_the_squares_at_each_level():
     low, high = (table.loc[("length_mm", "fine"), end] for end in ("J_low", "J_high"))
     np.testing.assert_allclose(low, np.sqrt(1e-4 - half))
     np.testing.assert_allclose(high, np.sqrt(1e-4 + half))
+
+
+def test_effects_name_the_experiments_whose_mean_they_are(caplog):
+    for designs in (L25, LHS):
+        data = plan(designs, designs[:, 0] * 1e-6)
+        for _, row in effects.main_effects(data, list(LEVELS)).iterrows():
+            own = data.sel(experiment=row["experiments"].split())
+            assert own[row["factor"]].mean() == pytest.approx(row["level"])
+            assert own["U_design"].sel(size_class="fine").mean() == pytest.approx(row["J"] ** 2)
+            assert (own[row["factor"]] == row["level"]).all() or designs is LHS
 
 
 def test_where_levels_are_not_repeated_bins_of_equal_count_stand_for_them(caplog):
@@ -141,7 +152,8 @@ def test_the_stage_writes_its_tables_and_leaves_out_designs_without_a_run(tmp_pa
     outputs = tmp_path / "effects.csv", tmp_path / "anova.csv"
     effects.effects({"factors": list(LEVELS)}, tmp_path / "dataset.nc", *outputs)
     levels, table = map(files.read_table, outputs)
-    assert list(levels) == ["factor", "level", "objective", "J", "J_low", "J_high"] and len(levels) == 30
+    columns = ["factor", "level", "objective", "J", "J_low", "J_high", "experiments"]
+    assert list(levels) == columns and len(levels) == 30
     assert levels.notna().all(axis=None)
     assert list(table) == ["objective", "source", "df", "sum_of_squares", "mean_square", "F", "p", "aliased"]
     assert table.loc[table["source"] == "designs", "df"].tolist() == [23, 23]

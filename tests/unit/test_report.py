@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hopperopt.report import answer, drawing, facts, page
+from hopperopt.report import answer, charts, drawing, facts, page
 
 CASES = {"found": "selected", "no_insert": "bare"}
 SECTIONS = [
@@ -68,6 +68,7 @@ def test_the_page_is_whole_and_asks_for_nothing_outside(rendered):
     assert len(parsed.ids) == len(set(parsed.ids))
     assert [place[1:] for place in parsed.places if place.startswith("#")] == SECTIONS
     assert set(SECTIONS) <= set(parsed.ids)
+    assert "Insert: slope 60°, length 50 mm, height 34 mm" in parsed.texts["p"]
 
 
 def test_the_charts_have_their_data(rendered, make_report_study):
@@ -79,6 +80,19 @@ def test_the_charts_have_their_data(rendered, make_report_study):
     assert data["front"]["points"][0]["J"] == [0.01, 0.02]
     assert len({point["insert"] for point in data["front"]["points"]}) == 5
     assert len(data["outflows"]) == len(study.kinds)
+    length = data["effects"][1]
+    assert (length["name"], length["unit"], length["selected"]) == ("length", "mm", 50)
+    assert length["words"] == ["30 mm", "35 mm", "40 mm", "45 mm", "50 mm"]
+    names = [name for level in length["experiments"] for name in level]
+    assert sorted(names) == study.data["experiment"].values.tolist()
+    assert np.shape([length["J"]["fine"], length["J"]["intermediate"]]) == (2, 5, 3)
+
+
+def test_a_bin_of_designs_is_told_by_its_range(make_report_study):
+    study, _ = make_report_study({"design": {"plan": "lhs", "lhs": {"experiments": 25}}})
+    (angle, *_) = charts.effects(study.effects, study.data, study.words(), study.selected["design"])
+    values = np.sort(study.data["theta_deg"].values).reshape(5, 5)
+    assert angle["words"] == [f"{row[0]:.3g}° to {row[-1]:.3g}°" for row in values]
 
 
 @pytest.mark.parametrize("insert", ["cone", "profile", "none"])
@@ -97,22 +111,26 @@ def test_four_factors_and_other_inserts(make_report_study, tmp_path, monkeypatch
     text = page.render(*rendering(make_report_study(document)))
     parsed = Page(text)
     assert {"wall static friction", "particle static friction", "outlet radius"} <= set(parsed.texts["th"])
+    assert any(words.startswith("Level ") for words in parsed.texts["p"])
     assert ('class="insert solid" d="M' in text) == (insert != "none")
 
 
 def test_hostile_names_are_text(make_report_study):
-    evil = '</script><script>alert("x")</script><img src=x onerror=alert(1)>'
+    evil = '</script><script>alert("x")</script><img/src=x/onerror=alert(1)>'
     study, case_of = make_report_study()
     attributes = next(iter(study.plan.values())).attrs | {"git": evil, "host": evil}
     plan = {(f"{name}{evil}", n): run.assign_attrs(attributes) for (name, n), run in study.plan.items()}
     data = study.data.assign_coords(experiment=[f"{name}{evil}" for name in study.data["experiment"].values])
     selected = study.selected | {"warning": evil}
-    made = study._replace(plan=plan, data=data, selected=selected)
+    named = [" ".join(name + evil for name in names.split()) for names in study.effects["experiments"]]
+    effects = study.effects.assign(experiments=named)
+    made = study._replace(plan=plan, data=data, effects=effects, selected=selected)
     parsed = Page(page.render(made, {"a": evil}, case_of, {}))
     assert len(parsed.texts["script"]) == 2
     assert not any(place == "x" for place in parsed.places)
-    told = json.loads(parsed.texts["script"][0])["curves"]["experiments"][0]["name"]
-    assert told.endswith(evil)
+    told = json.loads(parsed.texts["script"][0])
+    assert told["curves"]["experiments"][0]["name"].endswith(evil)
+    assert told["effects"][0]["experiments"][0][0].endswith(evil)
 
 
 def test_runs_that_did_not_end_well_are_told(make_report_study):

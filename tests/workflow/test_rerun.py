@@ -65,7 +65,7 @@ def jobs(row):
         elif cell == "●":
             found.add(column)
     # The report has no column: it is made of all but these.
-    return found | {"report"} if found - {"figure_hopper", "figure_curves"} else found
+    return found | {"report"} if found - {"figure_hopper", "figure_curves", "figure_effects"} else found
 
 
 def test_cells_hold_nothing_else():
@@ -280,7 +280,7 @@ def test_code(study, module):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("name", ["page.html", "style.css", "charts.js"])
+@pytest.mark.parametrize("name", ["page.html", "style.css", "charts.js", "front.js"])
 def test_another_page_is_the_reports_alone(study, name):
     study.add_code(f"report/{name}", "\n")
     assert study.planned() == {"report"}

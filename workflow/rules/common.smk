@@ -101,8 +101,10 @@ def compared_surrogates():
 
 def report_params():
     """Parameters of the report, with a digest of its page's parts that are no Python modules."""
-    parts = provenance.files_digest(provenance.PACKAGE / "report", "page.html", "style.css", "charts.js")
-    return as_json(STUDY.stage_params("report") | {"page": parts}, cli.STAGES["report"].module)
+    folder = provenance.PACKAGE / "report"
+    parts = sorted(path.name for path in folder.iterdir() if path.suffix in (".html", ".css", ".js"))
+    page = provenance.files_digest(folder, *parts)
+    return as_json(STUDY.stage_params("report") | {"page": page}, cli.STAGES["report"].module)
 
 
 def figure(name):

@@ -2,6 +2,7 @@ rule report:
     """The study on one page that opens anywhere."""
     input:
         dataset=result("dataset.nc"),
+        effects=result("analysis/effects.csv"),
         validation=result("surrogate/validation.csv"),
         comparison=result("surrogate/validation.nc"),
         surrogate=result("surrogate/model.nc"),
@@ -24,7 +25,8 @@ rule report:
     shell:
         "printf '%s\n' {input.simulations:q} | "
         "python -m hopperopt report --params {params.settings:q} --dataset {input.dataset:q} "
-        "--validation {input.validation:q} --comparison {input.comparison:q} --surrogate {input.surrogate:q} "
+        "--effects {input.effects:q} --validation {input.validation:q} --comparison {input.comparison:q} "
+        "--surrogate {input.surrogate:q} "
         "--front {input.front:q} --selected {input.selected:q} --verdict {input.verdict:q} "
         "--simulations - --verification {input.verification:q} "
         "--figures {input.figures:q} --output {output:q} > {log:q} 2>&1"

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from hopperopt import uncertainty
 from hopperopt.dataset import replicates
 from hopperopt.report import answer, drawing
+from hopperopt.surrogate.features import OUTPUTS
 
 DIGITS = 4  # decimals of mass fractions
 MOST_POINTS = 200  # of a front; of a longer one every so manyth is shown
@@ -83,6 +84,38 @@ def front(table: pd.DataFrame, factors: Sequence[str], walls_of: Callable[[Mappi
             }
         )
     return points
+
+
+def effects(
+    table: pd.DataFrame, dataset: xr.Dataset, words: Mapping[str, str], selected: Mapping[str, float]
+) -> list[dict]:
+    """Main effects: the levels of each factor, and at each J with its interval for each objective.
+
+    table: as effects.csv; words: plain names of the factors; selected: the design that the study selected.
+    """
+    found = []
+    for factor, rows in table.groupby("factor", sort=False):
+        by_objective = {name: rows[rows["objective"] == name] for name in OUTPUTS}
+        first = by_objective[OUTPUTS[0]]
+        experiments = [names.split() for names in first["experiments"]]
+        found.append(
+            {
+                "name": words[factor],
+                "unit": answer.plain(answer.style.factor_parts(factor)[1]).strip(),
+                "selected": selected[factor],
+                "levels": first["level"].tolist(),
+                "words": [_span(factor, dataset[factor].sel(experiment=names)) for names in experiments],
+                "experiments": experiments,
+                "J": {name: numbers(own[["J", "J_low", "J_high"]], 6) for name, own in by_objective.items()},
+            }
+        )
+    return found
+
+
+def _span(factor, values):
+    """A level in words, or the range of a bin of designs."""
+    ends = dict.fromkeys(value_words(factor, float(end)) for end in (values.min(), values.max()))
+    return " to ".join(ends)
 
 
 def value_words(factor: str, value: float) -> str:
