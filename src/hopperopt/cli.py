@@ -11,7 +11,6 @@ import importlib
 import json
 import logging
 import math
-import signal
 import sys
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -23,6 +22,7 @@ import yaml
 
 from hopperopt import commands, provenance
 from hopperopt.document import ConfigError, NotAllowed, lookup
+from hopperopt.interruption import interruptible
 from hopperopt.quantity import Quantity
 
 BAD_INPUT = 2
@@ -145,10 +145,10 @@ REPORTED = [name for name in FIGURES if name not in ("hopper", "curves", "effect
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return the exit status: 0, or 2 for input that cannot be used (said in one sentence)."""
     logging.basicConfig(level=logging.INFO, format="%(levelname)s: %(message)s", stream=sys.stderr)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    given = _parser().parse_args(arguments)
     try:
-        given.action(given)
+        with interruptible():
+            given = _parser().parse_args(arguments)
+            given.action(given)
     except KeyboardInterrupt:
         print("interrupted; the same command, or `make resume`, goes on", file=sys.stderr)
         return 130
