@@ -77,6 +77,8 @@ def make_report_study():
             kinds=dict(params["cases"]),
             keys=params["derived"]["keys"],
             data=data,
+            proposals=pd.DataFrame(),
+            infill={},
             effects=effects.main_effects(data, list(designs[next(iter(designs))])),
             selected={"design": centre, "rule": "knee", "warning": None},
             front=front,

@@ -116,6 +116,8 @@ STAGES = {
             "front",
             "selected",
             "verdict",
+            "proposals*",
+            "designs*",
             "simulations*",
             "verification*",
             "figures*",

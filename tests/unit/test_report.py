@@ -8,7 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from hopperopt import files
 from hopperopt.report import answer, charts, drawing, facts, page
+from hopperopt.report.study import rounds
 
 CASES = {"found": "selected", "no_insert": "bare"}
 SECTIONS = [
@@ -139,6 +141,33 @@ def test_runs_that_did_not_end_well_are_told(make_report_study):
     text = page.render(*rendering((study._replace(verification=study.verification | bad), case_of)))
     assert "1 run did not end well and is left out" in text
     assert "Bare, filling 1: jammed" in text and "No simulation ended well" in text
+
+
+def test_designs_of_infill_stand_beside_what_came_of_them(make_report_study, tmp_path):
+    """One round's design was dropped: it has no simulated J."""
+    study, case_of = make_report_study()
+    assert "<h2>Infill" not in page.render(*rendering((study, case_of)))
+    design = study.selected["design"]
+    names = ["infill_1_1", "infill_1_2"]
+    proposed = [{"experiment": n, **design, "chosen_as": "improvement", **PREDICTED} for n in names]
+    files.write_table(pd.DataFrame(proposed), tmp_path / "proposals.csv")
+    simulated = {"fine": 0.0225, "fine_low": 0.02, "fine_high": 0.025}
+    simulated |= {name.replace("fine", "intermediate"): 2 * value for name, value in simulated.items()}
+    done = pd.DataFrame(
+        [{"experiment": "infill_1_1", **design, "runs": 3, **simulated}, {"experiment": "exp_01"}]
+    )
+    files.write_table(done, tmp_path / "designs.csv")
+    table = rounds([tmp_path / "proposals.csv"], [tmp_path / "designs.csv"])
+    runs = {("infill_1_1", 1): next(iter(study.plan.values())).assign(status="jammed")}
+    text = page.render(*rendering((study._replace(proposals=table, infill=runs), case_of)))
+    assert '<a href="#infill">' in text and "0.0117" in text and "0.0225 (0.0200 to 0.0250)" in text
+    row = text[text.index("infill 1 2") :]
+    assert row[: row.index("</tr>")].endswith('<td class="number">0.0338</td><td class="number"></td>')
+    assert "Infill_1_1, filling 1: jammed" in text
+    assert len(rounds([], [])) == 0
+
+
+PREDICTED = {"J_fine": 0.0117, "J_intermediate": 0.0338, "expected_improvement": 0.01}
 
 
 def test_figures_are_part_of_the_file(make_report_study, tmp_path):

@@ -9,7 +9,9 @@ rule report:
         front=result("optimum/front.csv"),
         selected=result("optimum/selected.yaml"),
         verdict=result("verification/verdict.csv"),
-        simulations=plan_runs(),
+        proposals=proposals_to(len(PROPOSALS)),
+        designs=[of_round(len(PROPOSALS), "designs.csv")] if PROPOSALS else [],
+        simulations=[*plan_runs(), *infill_runs(len(PROPOSALS))],
         verification=[verification_runs(case) for case in CASES],
         figures=[result(f"figures/{name}.png") for name in cli.REPORTED],
     output:
@@ -28,5 +30,6 @@ rule report:
         "--effects {input.effects:q} --validation {input.validation:q} --comparison {input.comparison:q} "
         "--surrogate {input.surrogate:q} "
         "--front {input.front:q} --selected {input.selected:q} --verdict {input.verdict:q} "
+        "--proposals {input.proposals:q} --designs {input.designs:q} "
         "--simulations - --verification {input.verification:q} "
         "--figures {input.figures:q} --output {output:q} > {log:q} 2>&1"

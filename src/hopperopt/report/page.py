@@ -35,6 +35,8 @@ def report(
     front: str | os.PathLike,
     selected: str | os.PathLike,
     verdict: str | os.PathLike,
+    proposals: Iterable,
+    designs: Iterable,
     simulations: Iterable,
     verification: Iterable,
     figures: Iterable[str | os.PathLike],
@@ -45,11 +47,12 @@ def report(
     params: `cases`, pairs of name and kind; `factors`, their names in order; `settings`, those of the stages,
     which are shown; `derived`, a dict with the factors' `keys`; `case_of`, a function of a design that
     returns its case, None where it cannot be built. The others are paths: dataset.nc, effects.csv,
-    validation.csv, validation.nc, model.nc, front.csv, selected.yaml, verdict.csv, the plan's runs, the
-    verification's runs, PNG files of figures.
+    validation.csv, validation.nc, model.nc, front.csv, selected.yaml, verdict.csv, proposals.csv of each
+    round of infill, designs.csv of the last one, the runs of plan and infill, the verification's runs, PNG
+    files of figures.
     """
     tables = dataset, effects, validation, comparison, surrogate, front, selected, verdict
-    study = read(params, *tables, simulations, verification)
+    study = read(params, *tables, proposals, designs, simulations, verification)
     text = render(study, params["settings"], params["case_of"], {Path(p).stem: p for p in figures})
     with files.atomic(output) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -75,6 +78,7 @@ def render(
             **sections.opening(study),
             **sections.studied(study, settings),
             **sections.discharge(study),
+            **sections.infill(study),
             **sections.judged(study),
             **sections.provenance(study),
             "colours": style.COLOURS,

@@ -18,7 +18,7 @@ def opening(study: Study) -> dict:
     name = next((name for name, kind in study.kinds.items() if kind == PRIMARY), next(iter(study.kinds)))
     run = study.shown(name)
     shown = case(run)
-    dropped = sum(len(dataset.unusable_runs(runs)) for runs in (study.plan, study.verification))
+    dropped = sum(len(dataset.unusable_runs(runs)) for runs in (study.plan, study.infill, study.verification))
     lines, limits = drawing.dimensions(hopper.walls_of(shown), drawing.PER_M * shown["filling"]["level"])
     return {
         "answer": answer.answer(study.kinds, study.verdict, study.undetectable, dropped),
@@ -119,12 +119,31 @@ def front(study: Study, case_of: Callable) -> dict:
     return {"factors": list(study.words().values()), "points": points}
 
 
+def infill(study: Study) -> dict:
+    """The designs of the rounds of infill: as they were proposed, and what came of them."""
+    rows = []
+    for _, row in study.proposals.iterrows():
+        found = [
+            words
+            for size in ("fine", "intermediate")
+            for words in (
+                answer.decimals(row[f"J_{size}"]),
+                _interval(row, size, f"{size}_low", f"{size}_high", answer.decimals),
+            )
+        ]
+        design = answer.design_words({name: row[name] for name in study.keys})
+        rows.append((row["experiment"].replace("_", " "), design, row["chosen_as"], *found))
+    return {"proposals": rows}
+
+
 def judged(study: Study) -> dict:
     """How far the surrogates and the selected design can be trusted."""
     return {
         "surrogates": facts.surrogates(study.validation, study.surrogate.attrs["surrogate"]),
         "verdicts": _verdicts(study.verdict),
-        "warnings": facts.warnings(study.selected, (study.plan, study.verification), study.undetectable),
+        "warnings": facts.warnings(
+            study.selected, (study.plan, study.infill, study.verification), study.undetectable
+        ),
     }
 
 
@@ -153,7 +172,7 @@ def _interval(row, value, low, high, words):
 
 def provenance(study: Study) -> dict:
     """By what and in what time the files were made."""
-    runs = study.plan | study.verification
+    runs = study.plan | study.infill | study.verification
     made = {
         "simulations": [run.attrs for run in runs.values()],
         "data set": [study.data.attrs],
@@ -169,4 +188,5 @@ def provenance(study: Study) -> dict:
 
 def _groups(study: Study) -> dict[str, Runs]:
     """The runs by what they are for."""
-    return {"plan": study.plan} | {name.replace("_", " "): study.of_case(name) for name in study.kinds}
+    first = {"plan": study.plan} | ({"infill": study.infill} if study.infill else {})
+    return first | {name.replace("_", " "): study.of_case(name) for name in study.kinds}

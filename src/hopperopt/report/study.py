@@ -28,7 +28,9 @@ class Study(NamedTuple):
     validation: pd.DataFrame
     surrogate: xr.Dataset
     undetectable: list[str]
+    proposals: pd.DataFrame  # of all rounds of infill, with what was simulated; empty without any
     plan: Runs  # without the particles
+    infill: Runs  # likewise
     verification: Runs
 
     def of_case(self, name: str) -> Runs:
@@ -63,10 +65,15 @@ def read(
     front: str | os.PathLike,
     selected: str | os.PathLike,
     verdict: str | os.PathLike,
+    proposals: Iterable,
+    designs: Iterable,
     simulations: Iterable,
     verification: Iterable,
 ) -> Study:
     """Read the files of the stage `report`, see page.report."""
+    ends = {key: run.drop_dims(run.dims) for key, run in dataset.read_runs(simulations).items()}
+    proposed = rounds(proposals, designs)
+    names = set(proposed.get("experiment", ()))
     return Study(
         kinds=dict(params["cases"]),
         keys={name: params["derived"]["keys"][name] for name in params["factors"]},
@@ -78,6 +85,18 @@ def read(
         validation=files.read_table(validation),
         surrogate=files.read_netcdf(surrogate),
         undetectable=choice.undetectable(choice.squared_errors(files.read_netcdf(comparison))),
-        plan={key: run.drop_dims(run.dims) for key, run in dataset.read_runs(simulations).items()},
+        proposals=proposed,
+        plan={key: run for key, run in ends.items() if key[0] not in names},
+        infill={key: run for key, run in ends.items() if key[0] in names},
         verification=dict(dataset.read_runs(verification)),
     )
+
+
+def rounds(proposals: Iterable, designs: Iterable) -> pd.DataFrame:
+    """The designs of all rounds, as proposed and as the last round's table of designs has them simulated."""
+    tables = [files.read_table(path, "experiment", "chosen_as") for path in proposals]
+    if not tables:
+        return pd.DataFrame()
+    (simulated,) = (files.read_table(path, "experiment", "runs") for path in designs)
+    columns = ["experiment", *simulated.columns[simulated.columns.get_loc("runs") :]]
+    return pd.concat(tables).merge(simulated[columns], "left", "experiment")
