@@ -7,7 +7,6 @@ import numpy as np
 
 from hopperopt import config, experiment, outflow
 
-SEED = 1
 STATUSES = ("complete", "jammed", "incomplete", "unsettled", "monitor")
 BOUNDS = {"max_overlap": 0.3, "max_speed_ratio": 2.0, "max_energy_gain": 0.01, "lost_particles": 0}
 # Steps: up to 0.4 Rayleigh times for any material, 0.77 for materials like the paper's.
@@ -29,7 +28,7 @@ class Sample(NamedTuple):
     warned: Counter
 
 
-def sample(count, beyond=False, seed=SEED):
+def sample(count, seed, beyond=False):
     """The first `count` random designs within the bounds of validity, or `beyond` them; same for a seed.
 
     Within are those that the configuration accepts without a warning that a monitor may break.
@@ -143,13 +142,27 @@ def _document(rng):
 
 
 def _insert(rng, coarse):
-    shape = str(rng.choice(["none", "cone", "profile"]))
-    radius, below, above = coarse * rng.uniform(0.5, 4.0, 3)
+    radius, length, opening, cylinder = coarse * rng.uniform([0.5, 0.5, 0.6, 0.1], [4.0, 8.0, 4.0, 4.0])
+    lower, upper = rng.uniform(15.0, 85.0, 2)
+    points = np.column_stack(
+        [coarse * rng.uniform(0.5, 4.0, 3), np.cumsum(coarse * rng.uniform(0.2, 3.0, 3))]
+    )
+    shell = rng.random() < 0.5
     return {
-        "shape": shape,
+        "shape": str(rng.choice(["none", "cone", "double_cone", "bullet", "cone_in_cone", "profile"])),
         "height_mm": coarse * rng.uniform(1.0, 12.0),
-        "cone": {"slope_deg": rng.uniform(15.0, 85.0), "length_mm": coarse * rng.uniform(0.5, 8.0)},
-        "profile": {"points_mm": [[0, 0], [radius, below], [0, below + above]]},
+        "cone": {"slope_deg": lower, "length_mm": length},
+        "double_cone": {"lower_slope_deg": lower, "upper_slope_deg": upper, "length_mm": length},
+        "bullet": {"radius_mm": radius, "cylinder_length_mm": cylinder, "nose_slope_deg": upper},
+        "cone_in_cone": {
+            "slope_deg": rng.uniform(30.0, 89.0),
+            "length_mm": length,
+            "opening_radius_mm": opening,
+            "thickness_mm": coarse * rng.uniform(0.3, 1.0),
+        },
+        "profile": {
+            "points_mm": points.tolist() if shell else [[0, 0], *points.tolist(), [0, points[-1, 1] + radius]]
+        },
     }
 
 

@@ -13,13 +13,12 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
+import hypothesis
 import pandas as pd
-from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 
 from hopperopt import config, dataset, document, experiment, files
 
-SEED = 1
 PARTICLES, STEPS = 36, 10_000  # of a run, STEPS before and after the opening
 FINEST_STEP = 2e-7  # s; a run with a finer step is not made
 TOP = tuple(config.Study.model_fields)
@@ -60,19 +59,39 @@ def _factor(key, low, high, count):
     return st.fixed_dictionaries({"key": st.just(key), "levels": levels})
 
 
-def _factors(count):
-    return st.fixed_dictionaries(
-        {"height_mm": _factor("insert.height_mm", 30.0, 34.0, count)},
-        optional={
-            "theta_deg": _factor("insert.cone.slope_deg", 50.0, 60.0, count),
-            "length_mm": _factor("insert.cone.length_mm", 20.0, 40.0, count),
-            "friction": _factor("contact.particle.static_friction", 0.0, 2.0, count),
-        },
-    )
+# Factors that vary an insert of each shape, with a key and its range.
+SHAPES = {
+    "cone": {
+        "theta_deg": ("insert.cone.slope_deg", 50.0, 60.0),
+        "length_mm": ("insert.cone.length_mm", 20.0, 40.0),
+    },
+    "double_cone": {"lower_slope_deg": ("insert.double_cone.lower_slope_deg", 20.0, 60.0)},
+    "bullet": {"radius_mm": ("insert.bullet.radius_mm", 10.0, 25.0)},
+    "cone_in_cone": {"opening_radius_mm": ("insert.cone_in_cone.opening_radius_mm", 8.0, 16.0)},
+    "profile": {},
+    "none": {},
+}
+
+
+def _factors(shape, count):
+    height = {} if shape == "none" else {"height_mm": _factor("insert.height_mm", 30.0, 34.0, count)}
+    friction = {"friction": _factor("contact.particle.static_friction", 0.0, 2.0, count)}
+    others = {name: _factor(*key, count) for name, key in SHAPES[shape].items()}
+    return st.fixed_dictionaries(height or friction, optional=others | (friction if height else {}))
 
 
 CASES = ("selected", "plan_best", "plan_centre", "bare")
-POINTS = st.lists(st.tuples(number(0, 20), number(0, 30)).map(list), min_size=2, max_size=6)
+BODY = "body.csv"
+ANY = st.lists(st.tuples(number(0, 20), number(0, 30)).map(list), min_size=2, max_size=6)
+OFF_AXIS = st.lists(st.tuples(number(0.5, 20), number(0, 30)).map(list), min_size=2, max_size=6)
+RISING = OFF_AXIS.map(lambda points: sorted(points, key=lambda point: float(point[1])))
+SOLID = RISING.map(lambda points: [[0, -1], *points, [0, 31]])
+PROFILE = st.one_of(
+    *(st.fixed_dictionaries({"points_mm": points}) for points in (RISING, SOLID, SOLID)),
+    some(points_mm=ANY, file=st.sampled_from([BODY, "missing.csv"])),
+    st.just({"file": BODY}),
+)
+SLOPE = number(1, 89)
 SOUND = {
     "seed": whole(0, 2**62),
     "results_dir": st.sampled_from(["results", "a/b", "/nowhere/x", " spaced "]),
@@ -80,10 +99,17 @@ SOUND = {
         outlet_radius_mm=number(8, 30), half_angle_deg=number(15, 90), cylinder_radius_mm=number(40, 80)
     ),
     "insert": some(
-        shape=st.sampled_from(["cone", "cone", "cone", "none", "profile"]),
         height_mm=number(25, 80),
-        cone=some(slope_deg=number(10, 80), length_mm=number(2, 40)),
-        profile=some(points_mm=POINTS),
+        cone=some(slope_deg=SLOPE, length_mm=number(2, 40)),
+        double_cone=some(lower_slope_deg=SLOPE, upper_slope_deg=SLOPE, length_mm=number(2, 40)),
+        bullet=some(radius_mm=number(1, 25), cylinder_length_mm=number(0.1, 30), nose_slope_deg=SLOPE),
+        cone_in_cone=some(
+            slope_deg=SLOPE,
+            length_mm=number(2, 40),
+            opening_radius_mm=number(3, 20),
+            thickness_mm=number(1, 4),
+        ),
+        profile=PROFILE,
     ),
     "particles": some(
         diameters_mm=st.lists(number(1.5, 5), min_size=3, max_size=3).map(lambda d: sorted(d, key=float)),
@@ -129,24 +155,29 @@ SOUND = {
     ),
     "figures": some(dpi=whole(50, 600)),
 }
-PLANS = st.one_of(
-    st.fixed_dictionaries({}, optional={"factors": _factors(5)}),
-    st.fixed_dictionaries(
+
+
+def _plan(shape):
+    """A plan of an insert's shape: the default one, of the cone's factors, or another."""
+    arrays = st.fixed_dictionaries({"factors": _factors(shape, 5)})
+    spread = st.fixed_dictionaries(
         {
             "design": st.fixed_dictionaries(
                 {"plan": st.sampled_from(["lhs", "sobol"])}, optional={"replicates": whole(1, 20)}
             ),
-            "factors": _factors(3),
+            "factors": _factors(shape, 3),
         }
-    ),
-)
+    )
+    return st.one_of(arrays, spread, *([st.just({})] if shape == "cone" else []))
 
 
 @st.composite
 def documents(draw):
     """A document: some sections, each with some keys; half of them then spoilt in one to three places."""
-    plan, made = draw(PLANS), draw(some(**SOUND))
-    made = copy.deepcopy({**made, **plan})
+    shape = draw(st.sampled_from([*SHAPES]))
+    made = copy.deepcopy({**draw(some(**SOUND)), **draw(_plan(shape))})
+    if shape != "cone":  # the default
+        made["insert"] = {"profile": draw(PROFILE), **made.get("insert", {}), "shape": shape}
     for _ in range(draw(st.sampled_from([0, 0, 0, 1, 2, 3]))):
         _spoil(draw, made)
     return made
@@ -171,13 +202,13 @@ def _spoil(draw, made):
     made[last] = draw(st.sampled_from(NASTY))
 
 
-def outcomes(count):
-    """How often each `outcome` was that of `count` random documents, the same ones each time."""
+def outcomes(count, seed):
+    """How often each (outcome, shape of the insert) was that of `count` random documents; same for a seed."""
     found = Counter()
 
-    @seed(SEED)
-    @settings(max_examples=count, deadline=None, database=None)
-    @given(documents())
+    @hypothesis.seed(seed)
+    @hypothesis.settings(max_examples=count, deadline=None, database=None)
+    @hypothesis.given(documents())
     def check(raw):
         found[outcome(raw)] += 1
 
@@ -186,23 +217,26 @@ def outcomes(count):
 
 
 def outcome(raw):
-    """What becomes of a document: "refused", "accepted" (its step is too fine to run) or the run's status.
+    """What becomes of a document, and the shape of its insert (None where it is refused).
 
-    Raises AssertionError, or whatever the package raises in place of a sentence, where something is wrong.
+    "refused", "accepted" (its step is too fine to run) or the run's status. Raises AssertionError, or
+    whatever the package raises in place of a sentence, where something is wrong.
     """
     with tempfile.TemporaryDirectory() as folder:
+        Path(folder, BODY).write_text("r_mm,z_mm\n0,0\n10,0\n10,5\n0,20\n")
         try:
             study = config.parse(copy.deepcopy(raw), folder)
         except config.ConfigError as error:
             for sentence in str(error).split("\n"):
                 assert _names_a_key(sentence, raw), sentence
-            return "refused"
+            return "refused", None
         assert all(warning.isprintable() for warning in study.warnings())
         for stage in config.STAGES:  # the report's hold a case, where a rigid wall has an infinite modulus
             json.dumps(study.stage_params(stage), allow_nan=stage == "report")
         json.dumps(study.derived_params("selected", 1))
         small = _small(study)
-        return "accepted" if small.time_step < FINEST_STEP else _run(small, Path(folder))
+        ended = "accepted" if small.time_step < FINEST_STEP else _run(small, Path(folder))
+        return ended, study.insert.shape
 
 
 def _names_a_key(sentence, raw):
