@@ -274,6 +274,21 @@ def test_front_and_verdict_can_be_read(make_plan, found, cases):
     assert words.count("plan best") == 1 and words.count("better") == 6 and words.count("worse") == 2
 
 
+@pytest.mark.parametrize("feasible", [True, False])
+def test_designs_of_infill_have_a_mark_of_their_own(make_plan, feasible):
+    plan = make_plan(10)
+    names = ["exp_01", "exp_02", "exp_03", "exp_04", "exp_05", "exp_06", "exp_07", "exp_08", "infill_1_1"]
+    figure = front.draw(
+        table_of_front(feasible=feasible),
+        plan.assign_coords(experiment=[*names, "infill_1_2"]),
+        table_of_cases(),
+    )
+    check_texts(figure)
+    marks = {line.get_marker(): len(line.get_xdata()) for line in figure.axes[1].lines}
+    assert marks["^"] == 2
+    assert {"plan", "infill"} <= {text.get_text() for text, _ in written(figure)}
+
+
 def test_verdict_shows_the_luck_of_the_plans_best():
     panel = verdict.draw(table_of_cases(), table_of_designs()).axes[0]
     at = [case.get_text() for case in panel.get_yticklabels()].index("plan best")

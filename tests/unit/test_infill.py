@@ -1,12 +1,15 @@
 """The designs that rounds of infill propose, from Gaussian processes of curves of a known shape."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
 from pymoo.indicators.hv import HV
 
-from hopperopt import files, infill, outflow, verify
+from hopperopt import config, files, infill, outflow, verify
 from hopperopt.surrogate import gaussian, prediction
+from validation import infill as campaigns
 
 CORNER = np.array([1.0, 2.0])
 
@@ -140,3 +143,23 @@ def test_same_seed_same_proposals_and_another_round_others(propose):
     first, again, other = propose().read_text(), propose().read_text(), propose(round=3).read_text()
     assert first == again
     assert first.split(",")[8:] != other.split(",")[8:]
+
+
+def test_the_shipped_race_has_as_many_designs_on_both_sides():
+    root = Path(__file__).parents[2]
+
+    def designs(name):
+        study = config.parse(config.load([root / "config.yaml", root / f"config/{name}.yaml"]), root)
+        return len(study.plan) + sum(map(len, study.proposals()))
+
+    assert designs("infill") == designs("hypercube") == 33
+
+
+@pytest.mark.full
+def test_in_a_known_hopper_infill_sees_better_than_a_hypercube():
+    """Of few campaigns only what is plain: the front that is reached, no better than the best there is."""
+    known = campaigns.Truth.load()
+    ends = [campaigns.campaign(known, seed) for seed in range(1, 7)]
+    reached = {name: np.mean([end[name]["reached"] for end in ends]) for name in ("infill", "hypercube")}
+    assert reached["hypercube"] < reached["infill"] < 1.01
+    assert min(end["infill"]["score"] for end in ends) > known.least - 0.01

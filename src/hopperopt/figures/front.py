@@ -63,9 +63,8 @@ def draw(front: pd.DataFrame, dataset: xr.Dataset, verdict: pd.DataFrame) -> Fig
 
 def _meanings(front, infill):
     """What lines and marks mean, see style.key."""
-    marks = {"prediction of a case": PREDICTED, "case, simulated": SIMULATED, "plan, simulated": PLAN}
-    if infill:
-        marks["infill, simulated"] = INFILL
+    marks = {"prediction of a case": PREDICTED, "case, simulated": SIMULATED}
+    marks |= {"plan": PLAN, "infill": INFILL} if infill else {"plan, simulated": PLAN}
     if not front["feasible"].all():
         marks = {"impossible mass fractions": IMPOSSIBLE, **marks}
     if front["selected"].any():
