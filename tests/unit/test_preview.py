@@ -48,14 +48,17 @@ def test_table_follows_the_configuration():
     assert fixed["particles"] == "900" and fixed["plan"].endswith("1 filling of each")
 
 
-def test_expected_time_is_that_of_all_simulations(monkeypatch):
+@pytest.mark.parametrize(("files", "number"), [([], 165), (["config/infill.yaml"], 189)])
+def test_expected_time_is_that_of_all_simulations(monkeypatch, files, number):
     """With every simulation of one cost: their number times that, over the cores."""
     same = cost.Cost(15000, 36000, 3.3e8, 270)
     monkeypatch.setattr(cost, "expected", lambda *_: same)
     monkeypatch.setattr(preview.os, "sched_getaffinity", lambda process: range(3), raising=False)
     monkeypatch.setattr(preview, "duration", lambda seconds: f"{seconds:.1f}")
-    table = rows()
-    fast, slow = (165 * seconds / 3 for seconds in same.seconds)
+    table = rows(files=files)
+    assert table["simulations"].startswith(f"{number}: 75 of the plan, ")
+    assert ("24 of infill (2 x 4 designs), " in table["simulations"]) == (number == 189)
+    fast, slow = (number * seconds / 3 for seconds in same.seconds)
     assert table["all simulations"].startswith(f"{fast:.1f} to {slow:.1f} on this machine's 3 cores")
     assert table["one simulation"].startswith(
         f"{same.seconds[0]:.1f} to {same.seconds[1]:.1f} on a core, 36,000 "

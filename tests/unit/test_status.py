@@ -18,6 +18,18 @@ def runs():
     return status.planned(config.parse({"filling": {"particles": 60}, "design": {"replicates": 1}}))
 
 
+def test_rounds_of_infill_are_simulations_of_designs_to_be_found():
+    found = config.parse({"infill": {"rounds": 2, "batch": 1}, "design": {"replicates": 2}})
+    runs = [run for run in status.planned(found) if run.purpose == "infill"]
+    assert [str(run.file) for run in runs] == [
+        f"results/infill/round_{number}/infill_{number}_1_rep_{replicate}.nc"
+        for number in (1, 2)
+        for replicate in (1, 2)
+    ]
+    assert {run.case for run in runs} == {None}
+    assert "infill       [" in status.screen(runs, status.Seen(["done"] * 4, {}, []), Path("results"), [], 20)
+
+
 @pytest.fixture
 def study(tmp_path, monkeypatch, make_run, runs):
     """The study's simulations and functions that pretend that one has ended or runs."""
