@@ -161,7 +161,7 @@ def test_designs_of_infill_stand_beside_what_came_of_them(make_report_study, tmp
     runs = {("infill_1_1", 1): next(iter(study.plan.values())).assign(status="jammed")}
     text = page.render(*rendering((study._replace(proposals=table, infill=runs), case_of)))
     assert '<a href="#infill">' in text and "0.0117" in text and "0.0225 (0.0200 to 0.0250)" in text
-    row = text[text.index("infill 1 2") :]
+    row = text[text.index(">1.2<") :]
     assert row[: row.index("</tr>")].endswith('<td class="number">0.0338</td><td class="number"></td>')
     assert "Infill_1_1, filling 1: jammed" in text
     assert len(rounds([], [])) == 0

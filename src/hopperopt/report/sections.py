@@ -132,7 +132,8 @@ def infill(study: Study) -> dict:
             )
         ]
         design = answer.design_words({name: row[name] for name in study.keys})
-        rows.append((row["experiment"].replace("_", " "), design, row["chosen_as"], *found))
+        number = row["experiment"].removeprefix("infill_").replace("_", ".")  # round.design
+        rows.append((number, design, row["chosen_as"], *found))
     return {"proposals": rows}
 
 
