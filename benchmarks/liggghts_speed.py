@@ -27,7 +27,8 @@ provenance.use_numba_cache()
 import numpy as np  # noqa: E402
 import xarray as xr  # noqa: E402
 
-from validation import liggghts, liggghts_hopper  # noqa: E402
+from hopperopt import liggghts  # noqa: E402
+from validation import liggghts_hopper, liggghts_runs  # noqa: E402
 
 FILLING = 0.44  # s after which the bed is at rest
 OWN_STEPS, PEER_STEPS = 2000, 500  # of one turn: a second or two
@@ -40,7 +41,7 @@ STABLE_STEP = 3.5e-5  # s, the largest at which LIGGGHTS fills the hopper: at 3.
 def settled_bed(case, turns, steps):
     """Particle-steps per second of both codes, (turns, 2): this solver, LIGGGHTS; and LIGGGHTS' skin."""
     scene = liggghts.Scene.of_case(case)
-    simulation = scene.simulation(case["time_step"])
+    simulation = liggghts_runs.simulation(scene, case["time_step"])
     simulation.advance(round(FILLING / case["time_step"]))
     position = simulation.by_identity(simulation.spheres.position)
     rest = replace(scene, position=position, velocity=np.zeros_like(position))
@@ -59,8 +60,8 @@ def peer_rate(scene, skin, steps):
     files = scene.deck(SETTLED_STEP, skin=skin)
     files["in.start"] += f"run {RELAXING}\nrun {steps}\n"
     with tempfile.TemporaryDirectory() as folder:
-        log = liggghts.run(files, folder)
-    return len(scene.radius) * steps / liggghts.loop_times(log)[1]
+        log = liggghts_runs.run(files, folder)
+    return len(scene.radius) * steps / liggghts_runs.loop_times(log)[1]
 
 
 def own_experiment(case, folder):
@@ -92,9 +93,9 @@ def peer_experiment(case, filling, half, end, folder):
         f"run {before}\n{liggghts.look('half.txt')}run {after}\n"
     )
     begun = time.perf_counter()
-    liggghts.run(files, folder)
+    liggghts_runs.run(files, folder)
     seconds = time.perf_counter() - begun
-    out = liggghts.outflow_file(Path(folder, "outflow.txt"))[0]
+    out = liggghts_runs.outflow_file(Path(folder, "outflow.txt"))[0]
     return seconds, len(out), out.max()
 
 
@@ -122,7 +123,7 @@ def main():
     parser.add_argument("--experiment", action="store_true", help="a whole experiment as well (minutes)")
     parser.add_argument("--turns", type=int, default=5, help="of each code in the settled bed (default 5)")
     given = parser.parse_args()
-    liggghts.program()
+    liggghts_runs.program()
     provenance.compile_solver()
     case = liggghts_hopper.case(1, "cdt")
     rates, skin = settled_bed(case, given.turns, (OWN_STEPS, PEER_STEPS))

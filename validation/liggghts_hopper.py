@@ -20,9 +20,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hopperopt import config, design, geometry, monitors
+from hopperopt import config, design, geometry, liggghts, monitors
 from hopperopt.outflow import GRID, outflow
-from validation import liggghts
+from validation import liggghts_runs
 from validation.kept import kept
 from validation.report import Row, at_most, within
 
@@ -55,14 +55,14 @@ def peer_deck(scene, sensor):
 
 def read_peer(folder, log):
     """The arrays that are kept of LIGGGHTS' run."""
-    exit_time, diameter = liggghts.outflow_file(folder / "outflow.txt")
-    position, radius = liggghts.look_file(folder / "opening.txt")
+    exit_time, diameter = liggghts_runs.outflow_file(folder / "outflow.txt")
+    position, radius = liggghts_runs.look_file(folder / "opening.txt")
     return {
         "exit_time": exit_time,
         "diameter": diameter,
         "position": position.astype(np.float32),
         "radius": radius,
-        "thermo": liggghts.thermo(log),
+        "thermo": liggghts_runs.thermo(log),
     }
 
 
@@ -70,7 +70,7 @@ def peer_run(seed):
     """LIGGGHTS' run of a seed."""
     setting = case(seed, "cdt")
     files = peer_deck(liggghts.Scene.of_case(setting), setting["discharge"]["sensor"])
-    return liggghts.kept_run("liggghts-hopper", files, read_peer)
+    return liggghts_runs.kept_run("liggghts-hopper", files, read_peer)
 
 
 def own_run(seed, rolling):
@@ -79,7 +79,7 @@ def own_run(seed, rolling):
 
     def make():
         scene = liggghts.Scene.of_case(setting)
-        simulation = scene.simulation(setting["time_step"])
+        simulation = liggghts_runs.simulation(scene, setting["time_step"])
         simulation.advance(round(FILLING / setting["time_step"]))
         position = simulation.by_identity(simulation.spheres.position)
         simulation.open("gate", setting["discharge"]["sensor"])
@@ -136,7 +136,7 @@ def spread(values, unit, scale=1.0, digits=3):
 def measure(figures):
     """Rows of the comparison, and its figure."""
     setting = case(1, "cdt")
-    liggghts.program()
+    liggghts_runs.program()
     runs = {
         name: [
             peer_run(seed) if "LIGGGHTS" in name else own_run(seed, rolling) for seed in range(1, SEEDS + 1)

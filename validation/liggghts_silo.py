@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hopperopt import geometry
+from hopperopt import geometry, liggghts
 from hopperopt.dem.materials import rayleigh_time
 from hopperopt.packing import scatter
-from validation import liggghts
+from validation import liggghts_runs
 from validation.kept import kept
 from validation.report import Row, at_most
 
@@ -69,15 +69,15 @@ def peer_run(material):
         f"run {round(FILLING / step)}\n{liggghts.look('opening.txt')}{built.opening()}"
         f"run {round(DISCHARGE / step)}\n"
     )
-    return liggghts.kept_run(f"liggghts-silo-{material}", files, read_peer)
+    return liggghts_runs.kept_run(f"liggghts-silo-{material}", files, read_peer)
 
 
 def read_peer(folder, log):
     """The arrays that are kept of LIGGGHTS' run."""
     return {
-        "exit_time": liggghts.outflow_file(folder / "outflow.txt")[0],
-        "position": liggghts.look_file(folder / "opening.txt")[0].astype(np.float32),
-        "thermo": liggghts.thermo(log),
+        "exit_time": liggghts_runs.outflow_file(folder / "outflow.txt")[0],
+        "position": liggghts_runs.look_file(folder / "opening.txt")[0].astype(np.float32),
+        "thermo": liggghts_runs.thermo(log),
     }
 
 
@@ -86,7 +86,7 @@ def own_run(material):
     built, step = scene(material)
 
     def make():
-        simulation = built.simulation(step)
+        simulation = liggghts_runs.simulation(built, step)
         simulation.advance(round(FILLING / step))
         position = simulation.by_identity(simulation.spheres.position)
         simulation.open("gate", SENSOR)
@@ -110,7 +110,7 @@ def retained(run, time):
 
 def measure(figures):
     """Rows of the comparison, and its figure."""
-    liggghts.program()
+    liggghts_runs.program()
     rows = []
     for material in COMPARED:
         peer, own = peer_run(material), own_run(material)

@@ -20,15 +20,13 @@ from typing import NamedTuple
 
 import yaml
 
-from hopperopt import commands, provenance
-from hopperopt.document import ConfigError, NotAllowed, lookup
+from hopperopt import by_hand, commands, provenance
+from hopperopt.document import ConfigError, NotAllowed
 from hopperopt.interruption import interruptible
 from hopperopt.quantity import Quantity
 
 BAD_INPUT = 2
-MOST_SEED = 2**63 - 1
 STDIN = "-"  # stands for what is longer than the arguments of a command may be
-SHORTHANDS = {"theta": "theta_deg", "length": "length_mm", "height": "height_mm"}
 
 
 class Stage(NamedTuple):
@@ -221,14 +219,6 @@ def _json(text: str) -> dict:
         raise argparse.ArgumentTypeError(f"no JSON: {error}") from None
 
 
-def _seed(text: str) -> int:
-    if not text.isdecimal() or int(text) > MOST_SEED:
-        raise argparse.ArgumentTypeError(
-            f"{text} is not allowed; allowed: a whole number from 0 to 2**63 - 1"
-        )
-    return int(text)
-
-
 def _threads(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text} is not allowed; allowed: a whole number from 1")
@@ -269,23 +259,7 @@ def _derived_case(params: Mapping, design: Mapping[str, float]) -> dict | None:
 
 def _add_simulate(command: argparse.ArgumentParser) -> None:
     command.description = "Run one simulation of a design, or of the bare hopper, as the configuration says."
-    command.add_argument(
-        "--configfile",
-        nargs="+",
-        type=Path,
-        default=[Path("config.yaml")],
-        metavar="YAML",
-        help="the study; later files override earlier ones (default: config.yaml)",
-    )
-    for option, name in SHORTHANDS.items():
-        command.add_argument(f"--{option}", metavar="VALUE", help=f"short for --factor {name}=VALUE")
-    command.add_argument(
-        "--factor", action="append", default=[], metavar="NAME=VALUE", help="value of a factor of the study"
-    )
-    command.add_argument("--no-insert", action="store_true", help="the bare hopper")
-    command.add_argument(
-        "--seed", type=_seed, metavar="N", help="seed of the filling (default: from the study's)"
-    )
+    by_hand.add_options(command)
     command.add_argument(
         "--threads", type=_threads, metavar="N", help="threads to work with (default: the configuration's)"
     )
@@ -335,49 +309,12 @@ def _case(given: argparse.Namespace) -> tuple[dict, Running]:
     """The case to simulate (the workflow's, that of a design the study found, one by hand), and how."""
     if given.case is not None and not given.design:
         return given.case, Running()
-    from hopperopt import config
-
     if given.case is not None:
-        from hopperopt import verify
+        from hopperopt import config, verify
 
         design = verify.found_design(given.case["found"], given.design[0], given.case["keys"])
         return config.derived_case(given.case, design), Running()
-    study = config.parse(config.load(given.configfile), Path.cwd())
-    typed = _typed_factors(given)
-    if given.no_insert:
-        if typed:
-            raise ConfigError(f"--no-insert goes without values of factors ({', '.join(typed)})")
-        case = study.simulation_case(None, "by_hand", 1)
-    else:
-        case = config.derived_case(study.derived_params("by_hand", 1), _design(study, typed))
+    case, study = by_hand.case(given)
     settings = study.simulation
     running = Running(settings.threads, settings.checkpoint_minutes, Path(study.state_dir))
-    return case if given.seed is None else case | {"seed": given.seed}, running
-
-
-def _typed_factors(given: argparse.Namespace) -> dict[str, str]:
-    """Factor values as typed on the command line, by name."""
-    typed = {name: getattr(given, option) for option, name in SHORTHANDS.items()}
-    design = {name: value for name, value in typed.items() if value is not None}
-    for item in given.factor:
-        name, separator, value = item.partition("=")
-        if not separator:
-            raise ConfigError(f"--factor: {item} is not allowed; allowed: NAME=VALUE")
-        design[name] = value
-    return design
-
-
-def _design(study, typed: dict[str, str]) -> dict[str, float]:
-    """Complete design: factors that were not typed keep the value that their key has in the configuration."""
-    design = {name: lookup(study.document, factor.key) for name, factor in study.factors.items()}
-    for name, value in typed.items():
-        if name not in design:
-            raise ConfigError(f"--factor: {name} is not allowed; allowed: {', '.join(design)}")
-        try:
-            design[name] = Quantity().read(value)
-        except NotAllowed:
-            raise ConfigError(f"{name}: {value} is not allowed; allowed: a number") from None
-    for name, value in design.items():
-        if not isinstance(value, int | float):  # the key holds null or a word, as auto
-            raise ConfigError(f"{name} has no value: give --factor {name}=VALUE")
-    return design
+    return case, running

@@ -8,6 +8,9 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from hopperopt import by_hand
+from hopperopt.document import ConfigError
+
 
 def add(commands, figures: Sequence[str]) -> None:
     """Add the commands to the subparsers; figures: paths of all figures, below the folder of results."""
@@ -15,6 +18,7 @@ def add(commands, figures: Sequence[str]) -> None:
         (_add_check, "check", "say what a study will be, before anything runs"),
         (_add_status, "status", "show how far a study is"),
         (_add_render, "render", "draw a simulation as a movie, stills, or files for ParaView"),
+        (_add_export, "export", "write a simulation as input of LIGGGHTS, for beds beyond one machine"),
         (_add_archive, "archive", "put a study into one zip file"),
         (_add_reference, "reference", "write the configuration's schema and page of keys"),
     ):
@@ -178,3 +182,30 @@ def _render(given: argparse.Namespace) -> None:
         logging.getLogger("matplotlib").setLevel(logging.WARNING)  # it tells of each writer
         written = movie.write(given.run, stem, given.colour, given.format)
     print("\n".join(map(str, written)))
+
+
+def _add_export(command: argparse.ArgumentParser) -> None:
+    command.description = (
+        "Write a simulation as input of LIGGGHTS, which shares a bed among nodes: a design named as for "
+        "`simulate`, from its falling column, or a run from its settled bed."
+    )
+    by_hand.add_options(command)
+    command.add_argument(
+        "--run", type=Path, metavar="RUN.nc", help="settled bed of this simulation, in place of a design"
+    )
+    command.add_argument("--output", type=Path, required=True, metavar="DIR", help="folder to write")
+    command.set_defaults(action=_export)
+
+
+def _export(given: argparse.Namespace) -> None:
+    """Write LIGGGHTS' input, and say how it is run."""
+    from hopperopt import export
+
+    if given.run is None:
+        (case, _), bed = by_hand.case(given), None
+    elif named := by_hand.named(given):
+        raise ConfigError(f"--run goes without {', '.join(named)}: its file holds the design")
+    else:
+        case, bed = export.settled(given.run)
+    export.write(case, given.output, bed)
+    print(f"{given.output}: mpirun -np 16 liggghts -in {export.SCRIPT}, in that folder")

@@ -1,34 +1,28 @@
-"""LIGGGHTS, another DEM code: the same spheres, walls and materials as its input, its run, its output.
+"""Input of LIGGGHTS 3.8, another DEM code, which shares a bed among the processes of MPI.
 
 Walls of revolution become triangles, with the radii stretched so that the polygon has the circle's area.
+Lengths in m, times in s.
 """
 
-import hashlib
 import math
-import re
-import shutil
-import subprocess
-import tempfile
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
-from hopperopt.dem.materials import contact_law, youngs_modulus
-from hopperopt.dem.simulation import Simulation
-from hopperopt.experiment import build
-from validation.kept import kept
-from validation.report import Missing
+from hopperopt.dem.materials import youngs_modulus
 
-FACETS = 72  # of a full turn
+FACETS = 72  # of a full turn, or more
+BULGE = 0.05  # of the smallest radius: the most that the middle of a facet lies inside its corners' circle
 SKIN = 0.8  # of the neighbour lists, over the smallest radius: the fastest of a few in the hopper
+RIGID = 1.0e6  # times the spheres' modulus: that of a wall whose own is infinite
+SOFT, HARD = 5.0e6, 1.0e9  # Pa, Young's moduli beyond which LIGGGHTS wants to be told that they are meant
 ROLLING = {"none": "", "cdt": " rolling_friction cdt"}
 
 
 @dataclass
 class Scene:
-    """What both codes are given; SI units. `sphere` and `wall` are (shear modulus, Poisson's ratio), `pair`
+    """What is exported; SI units. `sphere` and `wall` are (shear modulus, Poisson's ratio), `pair`
     and `touch` (restitution, friction, rolling friction) of spheres with each other and with walls."""
 
     position: np.ndarray  # (n, 3)
@@ -45,7 +39,9 @@ class Scene:
 
     @classmethod
     def of_case(cls, case):
-        """The start of an experiment."""
+        """The start of an experiment, whose case says all of it."""
+        from hopperopt.experiment import build  # and numba, whose cache has to be named before
+
         simulation = build(case)
         spheres, particles, contact = simulation.spheres, case["particles"], case["contact"]
         constants = ("restitution", "static_friction", "rolling_friction")
@@ -63,21 +59,6 @@ class Scene:
             case["gravity"],
         )
 
-    def simulation(self, time_step):
-        """The same in this project's solver."""
-        return Simulation(
-            self.position,
-            self.velocity,
-            self.radius,
-            self.density,
-            self.walls,
-            contact_law(self.sphere, self.sphere, *self.pair),
-            contact_law(self.sphere, self.wall, *self.touch),
-            time_step,
-            gravity=self.gravity,
-            rolling=self.rolling,
-        )
-
     def deck(self, time_step, sensor=None, skin=SKIN):
         """LIGGGHTS' input as file name -> text, up to the first step: `in.start` is the script.
 
@@ -85,10 +66,11 @@ class Scene:
         lists over the smallest radius: it changes the speed and nothing else.
         """
         reach = max(points[:, 0].max() for points in self.walls.values())
-        files = {f"{name}.stl": stl(points) for name, points in self.walls.items()}
+        facets = self._facets(reach)
+        files = {f"{name}.stl": stl(points, facets) for name, points in self.walls.items()}
         meshes = [f"fix {name} all mesh/surface file {name}.stl type 2" for name in self.walls]
         if sensor is not None:
-            files["sensor.stl"] = stl(np.array([[0.0, sensor], [2.0 * reach, sensor]]))
+            files["sensor.stl"] = stl(np.array([[0.0, sensor], [2.0 * reach, sensor]]), facets)
             meshes.append("fix sensor all mesh/surface/planar file sensor.stl type 2")
         files["spheres.data"] = self._data(2.5 * reach, sensor or 0.0)
         files["in.start"] = "\n".join(
@@ -112,13 +94,19 @@ reset_timestep 0
         meshes = f"n_meshes {len(names)} meshes {' '.join(names)}"
         return f"fix touch all wall/gran {self._model} mesh {meshes}"
 
+    def _facets(self, reach):
+        """Facets of a turn: more of them for a wall whose radius `reach` is large beside the spheres."""
+        return max(FACETS, math.ceil(math.pi / math.acos(1.0 - BULGE * self.radius.min() / reach)))
+
     @property
     def _model(self):
         return "model hertz tangential history" + ROLLING[self.rolling]
 
     def _materials(self, time_step, skin):
+        sphere, wall = youngs_modulus(*self.sphere), youngs_modulus(*self.wall)
+        moduli = [sphere, wall if math.isfinite(wall) else RIGID * sphere]
         constants = [
-            ("youngsModulus", "", [youngs_modulus(*self.sphere), youngs_modulus(*self.wall)]),
+            ("youngsModulus", "", moduli),
             ("poissonsRatio", "", [self.sphere[1], self.wall[1]]),
         ]
         for k, name in enumerate(
@@ -130,11 +118,11 @@ reset_timestep 0
             f"fix m{k} all property/global {name} peratomtype{kind} {' '.join(f'{v:.9g}' for v in values)}"
             for k, (name, kind, values) in enumerate(constants)
         ]
-        # LIGGGHTS wants to be told that a modulus above 1e9 Pa is meant.
-        hard = ["hard_particles yes"] if max(constants[0][2]) > 1e9 else []
+        meant = [*(["soft_particles yes"] if min(moduli) < SOFT else []),
+                 *(["hard_particles yes"] if max(moduli) > HARD else [])]  # fmt: skip
         return "\n".join([
             "atom_style granular", "atom_modify map array", "boundary f f f", "newton off",
-            "communicate single vel yes", "units si", *hard, "read_data spheres.data",
+            "communicate single vel yes", "units si", *meant, "read_data spheres.data",
             f"neighbor {skin * self.radius.min():.6g} bin", "neigh_modify delay 0", *properties,
             f"pair_style gran {self._model}", "pair_coeff * *", f"timestep {time_step:.9g}",
             f"fix weight all gravity {self.gravity:.9g} vector 0 0 -1", "fix move all nve/sphere",
@@ -166,15 +154,15 @@ undump look
 """
 
 
-def stl(profile):
+def stl(profile, facets=FACETS):
     """A revolved profile, (points, 2) of r and z in m, as triangles in the text form of STL."""
-    turn = 2.0 * math.pi / FACETS
+    turn = 2.0 * math.pi / facets
     stretch = math.sqrt(turn / math.sin(turn))
-    angle = turn * np.arange(FACETS + 1)
+    angle = turn * np.arange(facets + 1)
     cosine, sine = stretch * np.cos(angle), stretch * np.sin(angle)
     lines = ["solid wall"]
     for (r1, z1), (r2, z2) in pairwise(np.asarray(profile, dtype=float)):
-        for k in range(FACETS):
+        for k in range(facets):
             a, b, c, d = ((r * cosine[j], r * sine[j], z) for r, z, j in
                           ((r1, z1, k), (r1, z1, k + 1), (r2, z2, k + 1), (r2, z2, k)))  # fmt: skip
             for corners, radius in (((a, b, c), r1), ((a, c, d), r2)):
@@ -183,61 +171,3 @@ def stl(profile):
                     lines += [f"vertex {x:.9e} {y:.9e} {z:.9e}" for x, y, z in corners]
                     lines += ["endloop", "endfacet"]
     return "\n".join([*lines, "endsolid wall", ""])
-
-
-def program():
-    """Path of the `liggghts` command; raises `Missing` without."""
-    path = shutil.which("liggghts")
-    if path is None:
-        raise Missing(
-            "LIGGGHTS is not here (Debian and Ubuntu: apt-get install --no-install-recommends liggghts)."
-        )
-    return path
-
-
-def run(files, folder):
-    """Write a deck's files into a folder and run its `in.start` on one core; returns the log's text."""
-    for name, text in files.items():
-        Path(folder, name).write_text(text)
-    command = [program(), "-in", "in.start", "-log", "none"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    if done.returncode or "ERROR" in done.stdout:
-        raise RuntimeError(f"LIGGGHTS ended with an error:\n{done.stdout[-2000:]}")
-    return done.stdout
-
-
-def kept_run(name, files, read):
-    """`read(folder, log)`'s arrays of a run, from the store if the very same files have been run before."""
-
-    def make():
-        with tempfile.TemporaryDirectory() as folder:
-            log = run(files, folder)
-            return read(Path(folder), log)
-
-    key = {file: hashlib.sha256(text.encode()).hexdigest() for file, text in files.items()}
-    return kept(name, key, make, solver=False)
-
-
-def outflow_file(path):
-    """Exit times (s) and diameters (m) of what passed the sensor, in that order."""
-    table = np.loadtxt(path, comments="#", ndmin=2)
-    return table[:, 1], table[:, 2]
-
-
-def look_file(path):
-    """Positions (n, 3) and radii (n,) that `look` wrote, by identity, m."""
-    table = np.loadtxt(path, skiprows=9, ndmin=2)
-    table = table[np.argsort(table[:, 0])]
-    return table[:, 1:4], table[:, 4]
-
-
-def thermo(log):
-    """Rows (step, spheres, kinetic energy in J, s of the clock) of all runs in a log, (n, 4)."""
-    number = r"[-+0-9.eE]+"
-    rows = re.findall(rf"^\s+(\d+)\s+(\d+)\s+({number}|-?nan)\s+({number})\s*$", log, re.MULTILINE)
-    return np.array(rows, dtype=float)
-
-
-def loop_times(log):
-    """Seconds that each `run` of a script took by LIGGGHTS' own clock."""
-    return [float(text) for text in re.findall(r"^Loop time of (\S+) on", log, re.MULTILINE)]
