@@ -173,6 +173,7 @@ def assemble(plan: pd.DataFrame, runs: Mapping, unusable: Mapping) -> xr.Dataset
         rows.append(xr.concat(row, "replicate", coords="minimal", compat="override", join="exact"))
     dataset = xr.concat(rows, "experiment", coords="minimal", compat="override", join="exact")
     dataset = dataset.assign_coords(_coordinates(plan, replicates, target))
+    dataset = dataset.assign_attrs(factors=" ".join(plan.columns))
     return _described(dataset.assign(_of_designs(dataset)), unusable)
 
 
@@ -331,5 +332,5 @@ def ranked_designs(dataset: xr.Dataset) -> pd.DataFrame:
 
 
 def _factors(dataset: xr.Dataset) -> list[str]:
-    names = (str(name) for name, c in dataset.coords.items() if c.dims == ("experiment",))
-    return [name for name in names if name != "experiment"]
+    """Names of the factors in the study's order, which the coordinates lose in a file."""
+    return dataset.attrs["factors"].split()

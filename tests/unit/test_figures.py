@@ -15,7 +15,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.testing.compare import compare_images
 from matplotlib.text import Text
 
-from hopperopt import cli, config, dataset, outflow, preview, provenance
+from hopperopt import cli, config, dataset, files, outflow, preview, provenance
 from hopperopt.figures import (
     curves,
     effects,
@@ -77,10 +77,7 @@ def make_training(make_plan, tmp_path):
     def training(split="experiments", **plan):
         data = make_plan(**plan)
         data.to_netcdf(tmp_path / "dataset.nc")
-        factors = [
-            name for name, c in data.coords.items() if c.dims == ("experiment",) and name != "experiment"
-        ]
-        params = {"factors": factors, "clip_sigma": 2.0, "split": split, "seed": 1}
+        params = {"factors": data.attrs["factors"].split(), "clip_sigma": 2.0, "split": split, "seed": 1}
         held_out = {"validation_experiments": 1, "test_experiments": 1}
         targets.filter_targets(params | held_out, tmp_path / "dataset.nc", tmp_path / "training.nc")
         result = xr.load_dataset(tmp_path / "training.nc")
@@ -205,6 +202,13 @@ def test_curves_can_be_read_for_any_number_of_experiments(make_plan, plan):
     assert sum(text.get_text() == "no complete run" for text, _ in written(figure)) == len(
         plan.get("dropped", ())
     )
+
+
+def test_factors_stand_in_the_studys_order(make_plan, make_training, tmp_path):
+    """A netCDF file gives its coordinates back in another one."""
+    files.write_netcdf(make_plan(5), tmp_path / "plan.nc")
+    for figure in (curves.draw(files.read_netcdf(tmp_path / "plan.nc")), fit.draw(*make_training())):
+        assert "$\\theta$ (°),  $L$ (mm),  $H$ (mm)" in [text.get_text() for text, _ in written(figure)]
 
 
 @pytest.mark.parametrize("split", ["experiments", "points"])
@@ -383,8 +387,8 @@ def test_hopper_can_be_read(run):
 @pytest.mark.parametrize("name", ["fourth_factor", "bullet", "double_cone", "cone_in_cone", "profile"])
 def test_extremes_can_be_read(name):
     root = provenance.PACKAGE.parents[1]
-    files = [root / "config.yaml", root / f"config/examples/{name}.yaml"]
-    figure = extremes.draw(preview.sketches(config.parse(config.load(files), root)))
+    paths = [root / "config.yaml", root / f"config/examples/{name}.yaml"]
+    figure = extremes.draw(preview.sketches(config.parse(config.load(paths), root)))
     check_texts(figure)
     words = " ".join(text.get_text() for text, _ in written(figure))
     assert "smallest gap" in words and "level of the bed, 74 mm" in words

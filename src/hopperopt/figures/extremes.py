@@ -54,10 +54,10 @@ def draw(sketches: Sequence[Sketch]) -> Figure:
     for panel in axes.flat[len(sketches) :]:
         panel.remove()
     for panel, sketch, each in zip(axes.flat, sketches, walls, strict=False):
-        panel.set(xlim=limits[:2], ylim=limits[2:], xlabel="$r$ / mm")
+        panel.set(xlim=limits[:2], ylim=limits[2:], xlabel="$r$ (mm)")
         _draw_hopper(panel, sketch, each, limits)
     for panel in axes[:, 0]:
-        panel.set_ylabel("height $z$ / mm")
+        panel.set_ylabel("height $z$ (mm)")
     return figure
 
 

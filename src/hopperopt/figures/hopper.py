@@ -153,9 +153,9 @@ def picture(run, position, colours, side, limits, resolution) -> np.ndarray:
 
 def _finish_axes(axes, limits):
     for panel in axes[:, 0]:
-        panel.set_ylabel("height $z$ / mm")
+        panel.set_ylabel("height $z$ (mm)")
     for panel, (_, _, name) in zip(axes[1], SIDES.values(), strict=True):
-        panel.set_xlabel(f"${name}$ / mm")
+        panel.set_xlabel(f"${name}$ (mm)")
     for panel in axes.flat:
         panel.set_xlim(limits[:2])
         panel.set_ylim(limits[2:])

@@ -23,7 +23,7 @@ FRAMES_PER_SECOND = 20
 COLOURS = {
     "size": None,
     "speed": ("speed / (m/s)", "viridis"),
-    "height": ("height before the discharge / mm", "cividis"),
+    "height": ("height before the discharge (mm)", "cividis"),
 }
 HOW = "for a movie, simulate it with `simulation: {snapshot_interval_s: 0.02}` in the configuration"
 
@@ -74,7 +74,7 @@ class _Scene:
         self.figure = style.page(WIDTH, frame.bottom + scale * (limits[3] - limits[2]) + frame.top)
         self._axes = style.panels(self.figure, 1, 1, frame, (0, 0))[0, 0]
         self._resolution = scale * style.MM * DPI
-        self._axes.set(xlim=limits[:2], ylim=limits[2:], xlabel="$x$ / mm", ylabel="height $z$ / mm")
+        self._axes.set(xlim=limits[:2], ylim=limits[2:], xlabel="$x$ (mm)", ylabel="height $z$ (mm)")
         hopper.draw_walls(self._axes, hopper.walls_of(case))
         if COLOURS[colour] is None:
             hopper.draw_key(self.figure, case, scale)

@@ -21,8 +21,9 @@ MOST_FACTORS, LONGEST_NAME = 4, 4  # what fits above a panel
 def grid(data: xr.Dataset, key: Mapping[str, Mapping] | None = None) -> tuple[Figure, list[Axes]]:
     """Page with a panel for each experiment, headed by its number and the values of its factors.
 
-    data: coordinate experiment and, along it, the factors; key: see style.key. Returns the figure and its
-    panels in the experiments' order; M runs from 0 to 1, the limits of y are shared and yet to be set.
+    data: coordinate experiment and, along it, the factors, which its attribute `factors` names in order;
+    key: see style.key. Returns the figure and its panels in the experiments' order; M runs from 0 to 1, the
+    limits of y are shared and yet to be set.
     """
     count = data.sizes["experiment"]
     columns = min(COLUMNS, math.ceil(math.sqrt(count)))
@@ -47,7 +48,7 @@ def grid(data: xr.Dataset, key: Mapping[str, Mapping] | None = None) -> tuple[Fi
 
 def _label(figure, panels, data, frame):
     """Write the panels' headings, what stands in them, and the names of the axes."""
-    factors = [name for name, c in data.coords.items() if c.dims == ("experiment",) and name != "experiment"]
+    factors = data.attrs["factors"].split()
     names = [re.sub(r"^exp_0*(?=\d)", "", str(name)) for name in data["experiment"].values]
     if len(factors) > MOST_FACTORS or max(map(len, names)) > LONGEST_NAME:
         factors = []

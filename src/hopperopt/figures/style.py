@@ -21,7 +21,7 @@ IMAGE_DPI = 400  # of images inside a PDF
 # Colours of Okabe and Ito, which colour-blind readers tell apart; the coarse particles stay behind in grey.
 COLOURS = {"fine": "#D55E00", "intermediate": "#0072B2", "coarse": "#8C8C8C"}
 SYMBOLS = {"fine": r"$m_\mathrm{f}$", "intermediate": r"$m_\mathrm{i}$", "coarse": r"$m_\mathrm{c}$"}
-OBJECTIVES = {"fine": r"$J_\mathrm{f}$", "intermediate": r"$J_\mathrm{i}$"}
+OBJECTIVES = {"fine": r"$J_\mathrm{f}$, fine", "intermediate": r"$J_\mathrm{i}$, intermediate"}
 INK, FAINT = "#333333", "#B0B0B0"
 DISCHARGED = "discharged mass fraction $M$"
 

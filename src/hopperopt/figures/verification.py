@@ -83,4 +83,4 @@ def _meanings(runs, predicted):
     if not runs:
         return {**meanings, "no complete simulation": {"linestyle": ""}}
     words = "simulation" if runs == 1 else f"{runs} simulations"
-    return {**meanings, words: SIMULATION, "counting noise, ±1.64 $s$": BAND}
+    return {**meanings, words: SIMULATION, "counting noise, 90 %": BAND}
