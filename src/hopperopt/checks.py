@@ -253,6 +253,7 @@ def warnings(study):
     extremes = [("a corner", corner, study.with_design(corner)) for corner in corners]
     refused = _grouped(extremes, findings.refused)
     found += _narrow_plan(study)
+    found += _far_cases(study)
     return found + [f"the optimiser may propose designs that are refused: {sentence}" for sentence in refused]
 
 
@@ -268,3 +269,16 @@ def _narrow_plan(study):
                 f"factors.{name}.levels: the optimiser searches {low:g} to {high:g}, but the experiments "
                 f"of the plan hold only {least:g} to {most:g}"
             )
+
+
+def _far_cases(study):
+    """Fixed cases outside the factors' ranges, of which the surrogate knows nothing."""
+    bounds = {name: plans.bounds(levels) for name, levels in study.levels.items()}
+    for case, design in study.verification.cases.items():
+        if isinstance(design, dict):
+            for name, (low, high) in bounds.items():
+                if not low <= design[name] <= high:
+                    yield (
+                        f"verification.cases.{case}.{name}: {design[name]:g} lies outside the factor's "
+                        f"range, {low:g} to {high:g}, where the surrogate's prediction means little"
+                    )

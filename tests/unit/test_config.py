@@ -528,6 +528,14 @@ def test_small_plan_that_can_be_split_is_accepted(tmp_path):
     assert len(config.parse(changes, tmp_path).plan) == 5
 
 
+@pytest.mark.parametrize(("length", "warned"), [(50, False), (51, True)])
+def test_case_outside_the_ranges_is_a_warning(length, warned):
+    case = {"theta_deg": 56.7, "length_mm": length, "height_mm": 33}
+    lines = config.parse({"verification": {"cases": {"long": case}, "replicates_of": {}}}).warnings()
+    said = "verification.cases.long.length_mm: 51 lies outside the factor's range, 30 to 50"
+    assert any(line.startswith(said) for line in lines) == warned
+
+
 def test_own_plan_narrower_than_its_levels_is_a_warning(tmp_path):
     narrow = "experiment,length_mm,height_mm\na,32,15\nb,50,34\nc,32,34\nd,40,20\ne,45,15\n"
     study = config.parse({**plan_file(tmp_path, narrow), "factors": TWO_FACTORS}, tmp_path)
