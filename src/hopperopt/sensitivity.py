@@ -20,9 +20,8 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
 from hopperopt import files
 from hopperopt.outflow import objective
-from hopperopt.surrogate import prediction
+from hopperopt.surrogate import gaussian, prediction
 from hopperopt.surrogate.features import OUTPUTS
-from hopperopt.surrogate.gaussian import LENGTHS
 from hopperopt.surrogate.network import one_thread
 
 SAMPLES = 256  # a power of two; each takes as many designs as there are factors, and two
@@ -95,11 +94,12 @@ def draw_times(
     trained = (np.column_stack([data[name].values for name in factors])[usable] - centre) / half
     mean, scale = times[usable].mean(), times[usable].std() or 1.0
     scores = (times[usable] - mean) / scale
-    kernel = ConstantKernel() * Matern(np.ones(len(factors)), LENGTHS, nu=2.5) + WhiteKernel(0.1)
+    kernel = ConstantKernel() * Matern(np.ones(len(factors)), gaussian.LENGTHS, nu=2.5) + WhiteKernel(0.1)
     with warnings.catch_warnings():
         # A factor without effect takes its length to the bound, as it should.
         warnings.simplefilter("ignore", ConvergenceWarning)
-        fitted = GaussianProcessRegressor(kernel, random_state=0).fit(trained, scores).kernel_
+        some = gaussian.searched(len(scores))
+        fitted = GaussianProcessRegressor(kernel, random_state=0).fit(trained[some], scores[some]).kernel_
     process = GaussianProcessRegressor(fitted.k1, alpha=fitted.k2.noise_level, optimizer=None)
     curve, covariance = process.fit(trained, scores).predict((designs - centre) / half, return_cov=True)
     return mean + scale * rng.multivariate_normal(curve, covariance, DRAWS, method="eigh")

@@ -26,6 +26,7 @@ from hopperopt.figures import (
     hopper,
     indices,
     labels,
+    multiples,
     sensitivity,
     spheres,
     style,
@@ -209,6 +210,21 @@ def test_factors_stand_in_the_studys_order(make_plan, make_training, tmp_path):
     files.write_netcdf(make_plan(5), tmp_path / "plan.nc")
     for figure in (curves.draw(files.read_netcdf(tmp_path / "plan.nc")), fit.draw(*make_training())):
         assert "$\\theta$ (°),  $L$ (mm),  $H$ (mm)" in [text.get_text() for text, _ in written(figure)]
+
+
+def test_a_page_of_panels_shows_some_of_many_experiments(make_training, tmp_path, monkeypatch):
+    """An image of thousands of panels would be larger than any program draws."""
+    training, _ = make_training(experiments=12, count=100)
+    drawn, factors = [], tuple(training.attrs["factors"].split())
+    model = mock.Mock(factors=factors, curves=lambda designs: np.full((len(designs), 2, 21), 0.1))
+    monkeypatch.setattr(fit.prediction, "load", lambda path: model)
+    monkeypatch.setattr(style, "save", lambda figure, *rest: drawn.append(figure))
+    monkeypatch.setattr(multiples, "MOST_PANELS", 5)
+    curves.write({"dpi": 50}, tmp_path / "dataset.nc", [])
+    fit.write({"dpi": 50}, tmp_path / "training.nc", tmp_path / "network.nc", [])
+    for figure in drawn:
+        assert [axes.get_title(loc="left") for axes in figure.axes] == ["1", "4", "7", "10"]
+    assert len(drawn) == 2
 
 
 @pytest.mark.parametrize("split", ["experiments", "points"])

@@ -102,3 +102,25 @@ def test_a_single_network_has_indices_without_intervals(run):
     assert single[["first_low", "first_high", "total_low", "total_high"]].isna().all(axis=None)
     assert table.loc["discharge_time"].notna().all(axis=None)
     assert table.equals(run(Ensemble((network,))))
+
+
+def test_many_experiments_take_part_and_some_are_searched(synthetic, monkeypatch):
+    """The search for a process' hyperparameters takes the cube of their number at each of its steps."""
+    seen = []
+    fit = sensitivity.GaussianProcessRegressor.fit
+
+    def spy(self, inputs, scores):
+        seen.append((self.optimizer is not None, len(inputs)))
+        return fit(self, inputs, scores)
+
+    monkeypatch.setattr(sensitivity.GaussianProcessRegressor, "fit", spy)
+    monkeypatch.setattr(gaussian, "SEARCHED", 13)
+    data = xr.Dataset(
+        {"discharge_time": (("experiment", "replicate"), 1.3 - 0.01 * synthetic.designs[:, 1:2])},
+        coords={name: ("experiment", synthetic.designs[:, k]) for k, name in enumerate(synthetic.factors)},
+    )
+    bounds = np.array([[min(levels), max(levels)] for levels in synthetic.factors.values()])
+    designs = synthetic.anywhere(10, np.random.default_rng(1))
+    drawn = sensitivity.draw_times(data, list(synthetic.factors), bounds, designs, np.random.default_rng(1))
+    assert seen == [(True, 13), (False, 25)]
+    np.testing.assert_allclose(drawn.mean(axis=0), 1.3 - 0.01 * designs[:, 1], atol=0.01)

@@ -50,6 +50,19 @@ def test_some_of_many_experiments_find_the_hyperparameters_and_all_predict(synth
     assert (np.sqrt(np.mean(difference**2, axis=(0, 2))) < synthetic.noise / np.sqrt(3)).all()
 
 
+def test_the_processes_are_conditioned_once(synthetic, monkeypatch):
+    """It takes the cube of the number of experiments, and a search predicts a hundred times."""
+    model, fitted = gaussian.fit(synthetic.training(3)), []
+    fit = gaussian.GaussianProcessRegressor.fit
+    monkeypatch.setattr(
+        gaussian.GaussianProcessRegressor, "fit", lambda self, *data: fitted.append(self) or fit(self, *data)
+    )
+    for _ in range(3):
+        model.moments(synthetic.designs, GRID)
+    model.draws(synthetic.designs, GRID, 2, np.random.default_rng(0))
+    assert len(fitted) == len(model.components)
+
+
 def test_without_an_effect_the_processes_predict_one_curve(synthetic):
     designs, bias = synthetic.anywhere(50, np.random.default_rng(0)), []
     J = objective(synthetic.curves(synthetic.designs).mean(axis=0), synthetic.batch)

@@ -13,8 +13,11 @@ from hopperopt.figures import labels, multiples, style
 
 
 def write(params: Mapping, dataset: str | os.PathLike, outputs: Sequence[str | os.PathLike]) -> None:
-    """Draw a data set; params: `dpi`; dataset: path of dataset.nc; outputs: paths, PNG or PDF."""
-    style.save(draw(files.read_netcdf(dataset)), outputs, params["dpi"])
+    """Draw at most 100 experiments of a data set.
+
+    params: `dpi`; dataset: path of dataset.nc; outputs: paths, PNG or PDF.
+    """
+    style.save(draw(multiples.some(files.read_netcdf(dataset))), outputs, params["dpi"])
 
 
 @style.styled

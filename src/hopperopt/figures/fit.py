@@ -26,8 +26,11 @@ def write(
     network: str | os.PathLike,
     outputs: Sequence[str | os.PathLike],
 ) -> None:
-    """Draw targets and network; params: `dpi`; training, network: paths of training.nc and network.nc."""
-    data, predictor = files.read_netcdf(training), prediction.load(network)
+    """Draw targets and network of at most 100 experiments.
+
+    params: `dpi`; training, network: paths of training.nc and network.nc; outputs: paths, PNG or PDF.
+    """
+    data, predictor = multiples.some(files.read_netcdf(training)), prediction.load(network)
     designs = np.column_stack([data[name].values for name in predictor.factors])
     style.save(draw(data, predictor.curves(designs)), outputs, params["dpi"])
 

@@ -11,11 +11,17 @@ from matplotlib.figure import Figure
 from hopperopt.figures import style
 
 COLUMNS = 5
+MOST_PANELS = 100
 PANEL = (29.0, 23.0)  # mm
 FRAME = style.Frame(left=11, right=7, bottom=8.5, top=9)
 GAPS = (3.0, 6.0)
 KEY = 4.0  # mm, height of the key's row
 MOST_FACTORS, LONGEST_NAME = 4, 4  # what fits above a panel
+
+
+def some(data: xr.Dataset) -> xr.Dataset:
+    """Every so manyth experiment of data: as many as a page can show."""
+    return data.isel(experiment=slice(None, None, -(-data.sizes["experiment"] // MOST_PANELS)))
 
 
 def grid(data: xr.Dataset, key: Mapping[str, Mapping] | None = None) -> tuple[Figure, list[Axes]]:

@@ -10,8 +10,9 @@ J larger; they are shrunk by as much (James and Stein), the mean curve towards t
 besides has a variance of its own, the same at every design.
 """
 
+import functools
 import warnings
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -31,7 +32,8 @@ RESTARTS = 1  # of the search for them, with seeds of their own
 LEAST_NOISE = 1e-4  # standard deviation of a mass fraction that counts as none
 
 
-class Gaussian(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Gaussian:
     """Independent processes of the scores, c components, given n training experiments."""
 
     designs: np.ndarray  # (n, factors)
@@ -50,7 +52,7 @@ class Gaussian(NamedTuple):
     def moments(self, designs: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and variance, (n, outputs, m) each, of the curves without noise, at the M of the training."""
         inputs = self._scaled(designs)
-        known = [process.predict(inputs, return_std=True) for process in self._processes()]
+        known = [process.predict(inputs, return_std=True) for process in self._processes]
         scores, deviations = (np.stack(part, axis=-1) for part in zip(*known, strict=True))
         own = np.einsum("nc,com->nom", deviations**2, self.components**2)
         shared = self.mean_variance + np.einsum(
@@ -64,7 +66,7 @@ class Gaussian(NamedTuple):
         """Draw curves without noise, joint over the designs: (number, n, outputs, m)."""
         inputs = self._scaled(designs)
         scores = []
-        for process in self._processes():
+        for process in self._processes:
             mean, covariance = process.predict(inputs, return_cov=True)
             scores.append(rng.multivariate_normal(mean, covariance, number, method="eigh"))
 
@@ -79,10 +81,11 @@ class Gaussian(NamedTuple):
     @one_thread
     def believing(self, design: np.ndarray, runs: int) -> "Gaussian":
         """The processes as if so many runs of a design (factors,) had shown what is predicted there."""
-        scores = [process.predict(self._scaled(design)) for process in self._processes()]
+        scores = [process.predict(self._scaled(design)) for process in self._processes]
         designs = np.vstack([self.designs, design])
         widths = range_scaling(self.designs).scale / range_scaling(designs).scale
-        return self._replace(
+        return replace(
+            self,
             designs=designs,
             noise=np.append(self.noise, 1 / runs),
             scores=np.vstack([self.scores, np.ravel(scores)]),
@@ -92,12 +95,16 @@ class Gaussian(NamedTuple):
     def _scaled(self, designs):
         return range_scaling(self.designs).normalise(np.atleast_2d(np.asarray(designs, dtype=float)))
 
+    @functools.cached_property
     def _processes(self):
-        """A process per component, conditioned on the training scores."""
-        for scores, variance, lengths in zip(self.scores.T, self.variances, self.lengths, strict=True):
-            kernel = ConstantKernel(variance) * Matern(lengths, nu=2.5)
-            process = GaussianProcessRegressor(kernel, alpha=self.noise, optimizer=None)
-            yield process.fit(self._scaled(self.designs), scores)
+        """A process per component, conditioned on the training scores: once, as that takes n^3."""
+        inputs = self._scaled(self.designs)
+        return [
+            GaussianProcessRegressor(
+                ConstantKernel(variance) * Matern(lengths, nu=2.5), alpha=self.noise, optimizer=None
+            ).fit(inputs, scores)
+            for scores, variance, lengths in zip(self.scores.T, self.variances, self.lengths, strict=True)
+        ]
 
 
 @one_thread
@@ -117,7 +124,7 @@ def fit(data: xr.Dataset) -> Gaussian:
     departures = ((curves - mean) / scale).reshape(len(curves), -1)
     directions, rest = _components(departures, noise.mean())
     scores, inputs = departures @ directions.T, range_scaling(designs).normalise(designs)
-    some = slice(None, None, -(-len(curves) // SEARCHED))
+    some = searched(len(curves))
     found = [_hyperparameters(inputs[some], score[some], noise[some]) for score in scores.T]
     variances, lengths = (np.array(part) for part in zip(*found, strict=True))
     from_batch, mean_variance = _shrunk(mean - batch[:, None], scale, noise.mean() / len(curves))
@@ -127,6 +134,11 @@ def fit(data: xr.Dataset) -> Gaussian:
         designs, noise, scale, batch[:, None] + from_batch, mean_variance, components, component_variances,
         rest, scores, variances, lengths,
     )  # fmt: skip
+
+
+def searched(experiments: int) -> slice:
+    """Those of so many experiments with which hyperparameters are searched."""
+    return slice(None, None, -(-experiments // SEARCHED))
 
 
 def _shrunk(curves, scale, variance):
