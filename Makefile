@@ -5,7 +5,7 @@
 # make setup               the environment alone; make cluster: and Snakemake's plugin for Slurm
 # make test, make lint     in the same environment: the tests; style and the boundaries between modules
 # make test-all            the tests with the full counts: hours
-# make test-browser        the report's page in Debian's Chromium; skipped where that is missing
+# make test-browser        both reports in Debian's Chromium; skipped where that is missing
 # make test-cluster        the study on a Slurm cluster of virtual nodes: as root on Debian, an hour
 # make validation         the solver against closed forms and other codes: rewrites docs/validation.md; CASE=name for one
 # make archive             configuration, lock, data, tables and figures of the study as one zip file

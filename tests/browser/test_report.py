@@ -1,23 +1,12 @@
-"""The report's page in a real browser: it renders, its charts answer, nothing spills over.
-
-Needs Chromium and its driver (Debian: apt install chromium chromium-driver).
-"""
+"""The report's page in a real browser: it renders, its charts answer, nothing spills over."""
 
 import json
-import shutil
 
 import pytest
 
 from hopperopt.report import page
 
-PROGRAMS = [shutil.which(name) for name in ("chromium", "chromedriver")]
-pytestmark = [
-    pytest.mark.full,
-    pytest.mark.skipif(
-        None in PROGRAMS,
-        reason="needs Chromium and its driver (Debian: apt install chromium chromium-driver)",
-    ),
-]
+pytestmark = pytest.mark.full
 WIDTHS = (400, 1400)
 # Number of sections upon others, how much wider the page is than its window, words covered or cut off.
 FAULTS = """
@@ -34,19 +23,6 @@ const words = [...document.querySelectorAll("svg")].flatMap(svg => {
 });
 return [upon, document.documentElement.scrollWidth - innerWidth, words];
 """
-
-
-@pytest.fixture(scope="module")
-def browser():
-    webdriver = pytest.importorskip("selenium.webdriver")
-    options = webdriver.ChromeOptions()
-    for argument in ("--headless=new", "--no-sandbox", "--hide-scrollbars"):
-        options.add_argument(argument)
-    options.binary_location = PROGRAMS[0]
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    driver = webdriver.Chrome(options, webdriver.ChromeService(PROGRAMS[1]))
-    yield driver
-    driver.quit()
 
 
 @pytest.fixture(scope="module")
