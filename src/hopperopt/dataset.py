@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from hopperopt import files, indices, outflow, uncertainty
+from hopperopt import files, indices, outflow, uncertainty, units
 
 # What a run that did not end well cannot tell; its counts and monitors stay, to show what went wrong.
 RESULTS = ("discharge_time", "discharge_rate", "mass_flow_index")
@@ -25,7 +25,6 @@ CONVENTIONS = "CF-1.11"
 RANKING = outflow.SIZE_CLASSES[:2]  # whose objectives rank the designs
 NAMED = 30  # experiments in one sentence
 # Unit of a factor by the end of its name.
-UNITS = {"_deg": "degree", "_mm": "mm", "_kg_m3": "kg m-3", "_pa": "Pa", "_m_s": "m s-1", "_s": "s"}
 
 
 def write_plan(params: Mapping, output: str | os.PathLike) -> None:
@@ -260,8 +259,7 @@ def _coordinates(plan: pd.DataFrame, replicates: list[int], target: np.ndarray) 
 
 
 def _factor_attributes(name: str) -> dict[str, str]:
-    unit = next((unit for suffix, unit in UNITS.items() if name.endswith(suffix)), "1")
-    return {"long_name": f"factor {name}", "units": unit}
+    return {"long_name": f"factor {name}", "units": units.split(name)[1].cf}
 
 
 def _described(dataset: xr.Dataset, unusable: Mapping) -> xr.Dataset:

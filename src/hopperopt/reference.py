@@ -4,21 +4,10 @@ import functools
 import json
 from collections.abc import Iterator, Mapping
 
-from hopperopt import config
+from hopperopt import config, units
 from hopperopt.document import lookup
 from hopperopt.quantity import Quantity
 
-# Unit of a key by the end of its name.
-UNITS = {
-    "mm": "mm",
-    "deg": "°",
-    "pa": "Pa",
-    "kg_m3": "kg/m³",
-    "m_s": "m/s",
-    "m_s2": "m/s²",
-    "s": "s",
-    "minutes": "min",
-}
 HEADING = """\
 # Every key of the configuration
 
@@ -72,9 +61,7 @@ def _rows(made: Mapping, key: str, entry: Mapping) -> Iterator[tuple[str, str, s
 
 
 def _unit(key: str) -> str:
-    name = key.rpartition(".")[2]
-    fitting = [end for end in UNITS if name.endswith(f"_{end}")]
-    return UNITS[max(fitting, key=len)] if fitting else ""
+    return units.split(key.rpartition(".")[2])[1].words.strip()
 
 
 @functools.cache

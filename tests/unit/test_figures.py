@@ -467,6 +467,10 @@ def test_designs_in_words():
     design = {"height_mm": 33.0, "outlet_radius_mm": 21.25, "wall_friction": 0.5, "theta_deg": 56.71}
     words = r"$\theta$ = 56.7°, $H$ = 33 mm, outlet radius = 21.2 mm, wall friction = 0.5"
     assert style.design_text(design) == words
+    assert (
+        style.design_text({"density_kg_m3": 950, "fall_m_s2": 9.81})
+        == "density = 950 kg/m³, fall = 9.81 m/s²"
+    )
 
 
 def test_files_are_the_same_every_time(tmp_path):

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 
-from hopperopt import files
+from hopperopt import files, units
 
 MM = 1 / 25.4  # inches
 COLUMN, PAGE = 85.0, 175.0  # widths in print, mm
@@ -28,7 +28,6 @@ DISCHARGED = "discharged mass fraction $M$"
 HALO = [withStroke(linewidth=1.8, foreground="white")]  # keeps words legible upon lines and particles
 
 FACTORS = {"theta": r"$\theta$", "length": "$L$", "height": "$H$"}
-UNITS = {"deg": "°", "mm": " mm"}
 
 styled: Callable = matplotlib.style.context(
     [
@@ -149,10 +148,8 @@ def save(figure: Figure, outputs: Iterable[str | os.PathLike], dpi: int) -> None
 
 def factor_parts(name: str) -> tuple[str, str]:
     """Symbol and unit of a factor: theta_deg gives (θ, °), outlet_radius_mm (outlet radius, mm)."""
-    stem, _, unit = name.rpartition("_")
-    if unit not in UNITS:
-        return name.replace("_", " "), ""
-    return FACTORS.get(stem, stem.replace("_", " ")), UNITS[unit]
+    stem, unit = units.split(name)
+    return FACTORS.get(stem, stem.replace("_", " ")), unit.words
 
 
 def design_text(design: Mapping[str, float]) -> str:

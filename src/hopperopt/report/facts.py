@@ -1,7 +1,6 @@
 """The page's tables: what was studied, warnings, by what the files were made, how long it took."""
 
 import json
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -9,7 +8,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from hopperopt import dataset, outflow
+from hopperopt import dataset, outflow, units
 from hopperopt.figures.errors import WORDS
 from hopperopt.report import answer
 
@@ -79,8 +78,7 @@ def factor_words(keys: Mapping[str, str]) -> dict[str, str]:
     Where two would be called the same, the part of the key before is named as well.
     """
     parts = {name: key.split(".") for name, key in keys.items()}
-    units = "|".join(dataset.UNITS)
-    last = {name: re.sub(rf"({units})$", "", part[-1]) for name, part in parts.items()}
+    last = {name: units.split(part[-1])[0] for name, part in parts.items()}
     clear = Counter(last.values())
     return {
         name: (word if clear[word] == 1 else f"{parts[name][-2]} {word}").replace("_", " ")
