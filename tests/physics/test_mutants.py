@@ -1,5 +1,7 @@
 """What the validation case `mutation` changes in a source."""
 
+import pytest
+
 from validation.mutants import mutants, observed
 from validation.mutation import ASIDE, EQUIVALENT, LAW
 from validation.trial import ROOT, SOLVER
@@ -58,6 +60,7 @@ def test_places_report_their_values(tmp_path):
     assert values["-k * x -> x"] == -6.0 and values["-k -> k"] == -2.0 and values["2.0 -> 2.5"] == 2.0
 
 
+@pytest.mark.full
 def test_lists_name_what_is_there():
     """Functions, names set aside and equivalent mutants of the force law exist in its source."""
     texts = {module: (ROOT / SOLVER / f"{module}.py") for module in LAW}
