@@ -24,7 +24,9 @@ def told(monkeypatch):
         assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
         return status
 
-    return run
+    ignored = signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background of a shell
+    yield run
+    signal.signal(signal.SIGINT, ignored)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
