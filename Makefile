@@ -28,8 +28,9 @@ if ! .venv/bin/python -c 'import sys; from hopperopt import locks; sys.exit(not 
 	echo "another make is at work on this study ($(STUDY)): wait for its end, or stop it first" >&2; exit 1; fi
 endef
 
-# Tests of one file share what they set up, so a process takes whole files.
-pytest = .venv/bin/python -m pytest --numprocesses logical --maxprocesses 8 --dist loadfile
+# Processes begin far apart in the order of the tests, so that those of one file mostly share what they set up, and end
+# together: who has nothing left takes tests from another.
+pytest = .venv/bin/python -m pytest --numprocesses logical --maxprocesses 8 --dist worksteal
 
 .PHONY: study resume report setup cluster test test-all test-browser test-cluster lint validation archive reference lock
 study: setup

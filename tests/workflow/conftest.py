@@ -6,9 +6,12 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
+
+from .forked import snakemake_in_fork
 
 CLONE = Path(__file__).resolve().parents[2]
 SIMULATIONS = ("simulate", "verify_simulate")
@@ -57,8 +60,17 @@ class Study:
 
     def start_snakemake(self, *options):
         """Start Snakemake; return the process, of a group of its own."""
-        program = [sys.executable, "-m", "snakemake", "--snakefile", self.clone / "Snakefile"]
-        return self.start([*program, "--directory", self.directory, "--cores", "2", *options])
+        return self.start([sys.executable, "-m", "snakemake", *self._options, *options])
+
+    def ask(self, *options):
+        """What Snakemake answers where nothing is to run; as `snakemake`, and cheaper."""
+        with tempfile.NamedTemporaryFile() as output:
+            options = [*self._options, *options]
+            return snakemake_in_fork(options, self.directory, self.environment, output.name)
+
+    @property
+    def _options(self):
+        return ["--snakefile", self.clone / "Snakefile", "--directory", self.directory, "--cores", "2"]
 
     def start(self, command):
         """Start a command; return the process, of a group of its own, with its output as text."""
@@ -74,7 +86,7 @@ class Study:
 
     def jobs(self, *options):
         """(rule, paths of its outputs) of each job that a dry run plans."""
-        answer = self.snakemake("--dry-run", *options)
+        answer = self.ask("--dry-run", *options)
         assert answer.returncode == 0, answer.stdout
         job = r"^(?:local)?rule (\w+):\n(?:    .*\n)*?    output: (.*)\n"
         found = re.findall(job, answer.stdout, re.MULTILINE)
@@ -117,7 +129,7 @@ class Study:
             for path in outputs:
                 (self.directory / path).parent.mkdir(parents=True, exist_ok=True)
                 (self.directory / path).write_text(path)
-        answer = self.snakemake("--touch", "--forceall")
+        answer = self.ask("--touch", "--forceall")
         assert answer.returncode == 0, answer.stdout
 
 

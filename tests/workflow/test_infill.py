@@ -43,7 +43,7 @@ def test_a_round_reruns_nothing_of_the_plan(study):
 
 @pytest.mark.full
 def test_what_reruns_rounds(study):
-    assert study.snakemake("--touch", "--forceall").returncode == 0
+    assert study.ask("--touch", "--forceall").returncode == 0
     options = with_infill(study, 2)
     pretend(study, options)
     assert planned(study, *options) == ({}, set())
@@ -78,7 +78,7 @@ def pretend(study, options):
         for path in outputs:
             (study.directory / path).parent.mkdir(parents=True, exist_ok=True)
             (study.directory / path).touch()
-    assert study.snakemake("--touch", "--forceall", *options).returncode == 0
+    assert study.ask("--touch", "--forceall", *options).returncode == 0
 
 
 @pytest.mark.full

@@ -165,7 +165,7 @@ def test_the_orphan_of_a_killed_snakemake_is_waited_for(killed, finished):
     (orphan,) = killed.wait_until_held([run])
     os.kill(first.pid, signal.SIGKILL)
     first.wait()
-    assert killed.snakemake("--unlock").returncode == 0
+    assert killed.ask("--unlock").returncode == 0
     second = killed.start_snakemake("--rerun-incomplete", target)
     killed.wait_for_log(f"process {orphan} is still simulating {target}; waiting for it to end", [run])
     assert not (killed.directory / target).exists()

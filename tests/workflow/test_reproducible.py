@@ -46,13 +46,13 @@ def same(one, other):
     return one == other if isinstance(one, bytes) else one.identical(other)
 
 
-RUN_TO_OPTIMUM = ["--forcerun", "results/simulations/exp_01_rep_1.nc", "--", "results/optimum/selected.yaml"]
+RUN_TO_NETWORK = ["--forcerun", "results/simulations/exp_01_rep_1.nc", "--", "results/surrogate/network.nc"]
 
 
 @pytest.mark.parametrize(
     "again",
     [
-        pytest.param(RUN_TO_OPTIMUM, id="a run with what follows up to the optimum"),
+        pytest.param(RUN_TO_NETWORK, id="a run with what follows up to the networks"),
         pytest.param(["--forceall"], id="everything", marks=pytest.mark.full),
     ],
 )
@@ -65,7 +65,7 @@ def test_other_surroundings_change_no_bit(finished, tmp_path, again):
     answer = study.snakemake("--cores", "1", *again)
     assert answer.returncode == 0, answer.stdout
     before, after = (place / "results" for place in (finished.directory, folder))
-    assert newer(before / "optimum" / "front.csv", after / "optimum" / "front.csv")
+    assert newer(before / "surrogate" / "network.nc", after / "surrogate" / "network.nc")
     assert differing(before, after) == []
 
 

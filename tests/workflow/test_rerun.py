@@ -214,7 +214,7 @@ def test_every_key_has_another_value():
 @pytest.mark.full
 def test_the_code_of_snapshots_counts_where_they_are_taken(study):
     override(study, "simulation.snapshot_interval_s", 0.1)
-    assert study.snakemake("--touch", "--forceall", "--configfile", "other.yaml").returncode == 0
+    assert study.ask("--touch", "--forceall", "--configfile", "other.yaml").returncode == 0
     assert study.planned("--configfile", "other.yaml") == set()
     study.add_code("snapshots.py", EXTRA)
     assert study.planned("--configfile", "other.yaml") == jobs(row_of("hopper"))
@@ -483,7 +483,7 @@ def logs_deleted(study):
 @change("`.snakemake/` deleted", FULL)
 def records_deleted(study):
     shutil.rmtree(study.directory / ".snakemake")
-    assert "missing provenance/metadata" in study.snakemake("--dry-run").stdout
+    assert "missing provenance/metadata" in study.ask("--dry-run").stdout
     return study.planned()
 
 
@@ -579,7 +579,7 @@ def test_every_change_of_the_page_is_tested():
 def test_results_are_accepted_after_an_edit_by_touch_or_by_dates(study):
     study.add_code("dem/laws.py", EXTRA)
     assert study.planned("--rerun-triggers", "mtime") == set()
-    assert study.snakemake("--touch").returncode == 0
+    assert study.ask("--touch").returncode == 0
     assert study.planned() == set()
     before_the_edit = type(study)(study.directory)
     assert before_the_edit.planned() == jobs(code_row("dem/laws.py"))

@@ -105,13 +105,13 @@ def test_by_hand_and_by_the_workflow_give_the_same_run(finished, tmp_path):
 
 
 def test_lint_asks_for_nothing_but_a_container(finished):
-    said = finished.snakemake("--lint").stdout
+    said = finished.ask("--lint").stdout
     advice = re.findall(r"^    \* (.*)", said, re.MULTILINE)
     assert set(advice) == {"Specify a conda environment or container for each rule.:"}, said
 
 
 def test_the_graph_has_every_rule(finished):
-    graph = finished.snakemake("--rulegraph").stdout
+    graph = finished.ask("--rulegraph").stdout
     rules = set(re.findall(r'label = "(\w+)"', graph))
     assert {
         "design",
@@ -132,7 +132,7 @@ def test_the_graph_has_every_rule(finished):
 
 
 def test_the_report_holds_tables_and_figures(finished, tmp_path):
-    answer = finished.snakemake("--report", tmp_path / "report.html")
+    answer = finished.ask("--report", tmp_path / "report.html")
     assert answer.returncode == 0, answer.stdout
     text = (tmp_path / "report.html").read_text()
     assert all(
@@ -149,13 +149,13 @@ def test_the_report_holds_tables_and_figures(finished, tmp_path):
     ],
 )
 def test_a_mistake_is_a_sentence_while_the_workflow_is_read(new_study, tmp_path, text, said):
-    answer = new_study(tmp_path, f"{text}\n").snakemake("--dry-run")
+    answer = new_study(tmp_path, f"{text}\n").ask("--dry-run")
     assert answer.returncode != 0
     assert said in answer.stdout
     assert "Traceback" not in answer.stdout and "http" not in answer.stdout
 
 
 def test_a_warning_is_said_once_and_stops_nothing(new_study, tmp_path):
-    answer = new_study(tmp_path, "results_dir: results\n").snakemake("--dry-run")
+    answer = new_study(tmp_path, "results_dir: results\n").ask("--dry-run")
     assert answer.returncode == 0
     assert answer.stdout.count("2.89 coarse diameters") == 1
