@@ -22,7 +22,7 @@ FRAMES_PER_SECOND = 20
 # What colours mean, and their map.
 COLOURS = {
     "size": None,
-    "speed": ("speed / (m/s)", "viridis"),
+    "speed": ("speed (m/s)", "viridis"),
     "height": ("height before the discharge (mm)", "cividis"),
 }
 HOW = "for a movie, simulate it with `simulation: {snapshot_interval_s: 0.02}` in the configuration"
