@@ -403,7 +403,7 @@ def command_changed(study):
 @change("`threads`, `resources` and comments of rules", FULL)
 def rule_changed(study):
     study.edit_code("workflow/rules/optimise.smk", "threads: 1", "threads: 2  # cores")
-    study.edit_code("workflow/rules/optimise.smk", "mem_mb=1000", "mem_mb=2000")
+    study.edit_code("workflow/rules/optimise.smk", "runtime=15", "runtime=20")
     return study.planned()
 
 

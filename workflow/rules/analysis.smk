@@ -33,7 +33,7 @@ rule sensitivity:
         settings=stage("sensitivity"),
     threads: 1
     resources:
-        mem_mb=1500,
+        mem_mb=500 + surrogate_memory(),
         runtime=10,
     shell:
         "python -m hopperopt sensitivity --params {params.settings:q} --surrogate {input.surrogate:q} "

@@ -168,6 +168,11 @@ def growing(minutes):
     return lambda wildcards, attempt: attempt * minutes
 
 
+def surrogate_memory():
+    """Memory (MB) of a job that fits or asks surrogates: the processes' covariances grow as the square of the plan."""
+    return 1000 + round(4e-5 * len(EXPERIMENTS) ** 2)
+
+
 def simulation_resources():
     """Memory (MB) and time (minutes) granted to a simulation, a few times what the dearest design takes."""
     interval = STUDY.simulation.snapshot_interval_s

@@ -29,7 +29,7 @@ rule infill_model:
         settings=stage("infill_model"),
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=surrogate_memory(),
         runtime=10,
     shell:
         "python -m hopperopt choose --params {params.settings:q} --training {input.training:q} "
@@ -50,7 +50,7 @@ rule infill_front:
         settings=stage("infill_front"),
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=surrogate_memory(),
         runtime=15,
     shell:
         "python -m hopperopt optimise --params {params.settings:q} --surrogate {input.surrogate:q} "
@@ -75,7 +75,7 @@ rule propose:
         settings=proposal_params,
     threads: 1
     resources:
-        mem_mb=1500,
+        mem_mb=500 + surrogate_memory(),
         runtime=10,
     shell:
         "python -m hopperopt propose --params {params.settings:q} --surrogate {input.surrogate:q} "

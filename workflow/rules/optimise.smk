@@ -12,7 +12,7 @@ rule optimise:
         settings=stage("optimise"),
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=surrogate_memory(),
         runtime=15,
     shell:
         "python -m hopperopt optimise --params {params.settings:q} --surrogate {input.surrogate:q} "

@@ -51,7 +51,7 @@ rule validate_fold:
         settings=fold_params,
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=surrogate_memory(),
         runtime=10,
     shell:
         "python -m hopperopt validate_fold --params {params.settings:q} --training {input.training:q} "
@@ -96,7 +96,7 @@ rule choose:
         settings=stage("choose"),
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=surrogate_memory(),
         runtime=10,
     shell:
         "python -m hopperopt choose --params {params.settings:q} --training {input.training:q} "
