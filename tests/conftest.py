@@ -15,6 +15,11 @@ os.environ.setdefault("NUMBA_NUM_THREADS", "4")  # more threads than cores are n
 provenance.use_numba_cache()
 
 
+def pytest_collection_modifyitems(items):
+    """Whole studies first: what parallel processes would wait for at the end."""
+    items.sort(key=lambda item: "workflow" not in item.path.parts)
+
+
 @pytest.fixture(scope="session")
 def make_report_study():
     """Function that returns the report's Study, of runs made without a simulation, and its cases."""
