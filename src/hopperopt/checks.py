@@ -273,10 +273,9 @@ def _narrow_plan(study):
 
 def _far_cases(study):
     """Fixed cases outside the factors' ranges, of which the surrogate knows nothing."""
-    bounds = {name: plans.bounds(levels) for name, levels in study.levels.items()}
     for case, design in study.verification.cases.items():
         if isinstance(design, dict):
-            for name, (low, high) in bounds.items():
+            for name, (low, high) in study.bounds.items():
                 if not low <= design[name] <= high:
                     yield (
                         f"verification.cases.{case}.{name}: {design[name]:g} lies outside the factor's "

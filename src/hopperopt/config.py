@@ -656,6 +656,11 @@ class Study(Setup):
         """The levels of each factor, by name."""
         return {name: factor.levels for name, factor in self.factors.items()}
 
+    @property
+    def bounds(self):
+        """Smallest and largest level of each factor, by name: lists, as plain JSON has them."""
+        return {name: list(plans.bounds(levels)) for name, levels in self.levels.items()}
+
     def with_design(self, design):
         """The study at one design (factor values by name); raises ConfigError when a value is not allowed."""
         if unknown := [name for name in design if name not in self.factors]:
@@ -748,13 +753,13 @@ STAGES = {
     "validate": lambda study: study.surrogate.networks | {"starts": study.surrogate.validation.starts},
     "choose": lambda study: {"model": study.surrogate.model, **study.surrogate.networks},
     "sensitivity": lambda study: {
-        "bounds": {name: list(plans.bounds(levels)) for name, levels in study.levels.items()},
+        "bounds": study.bounds,
         "seed": study.surrogate.seed,
     },
     "optimise": lambda study: {
         **study.optimise.model_dump(exclude={"explicit"}),
         "explicit": study.optimise.explicit if study.optimise.select == "explicit" else None,
-        "bounds": {name: list(plans.bounds(levels)) for name, levels in study.levels.items()},
+        "bounds": study.bounds,
         "centre": plans.centre(study.levels),
     },
     # Rounds of infill follow Gaussian processes, whatever surrogate the study goes on with: clip and split
@@ -770,7 +775,7 @@ STAGES = {
     "infill_model": lambda study: {"model": "gaussian", "seed": study.surrogate.seed},
     "infill_front": lambda study: study.stage_params("optimise") | {"select": "knee", "explicit": None},
     "propose": lambda study: {
-        "bounds": {name: list(plans.bounds(levels)) for name, levels in study.levels.items()},
+        "bounds": study.bounds,
         "replicates": study.design.replicates,
         "seed": study.optimise.seed,
         "derived": study.derived_params("propose", 1),

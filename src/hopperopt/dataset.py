@@ -24,7 +24,6 @@ RUN = {
 CONVENTIONS = "CF-1.11"
 RANKING = outflow.SIZE_CLASSES[:2]  # whose objectives rank the designs
 NAMED = 30  # experiments in one sentence
-# Unit of a factor by the end of its name.
 
 
 def write_plan(params: Mapping, output: str | os.PathLike) -> None:
