@@ -14,10 +14,10 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 import xarray as xr
-from scipy.stats import f
-from sklearn.preprocessing import minmax_scale
+from scipy.special import fdtrc
 
 from hopperopt import files, outflow
+from hopperopt.surrogate.network import range_scaling
 from hopperopt.uncertainty import Estimate
 
 OUTPUTS = outflow.SIZE_CLASSES[:2]  # whose objectives there are
@@ -47,7 +47,8 @@ def effects(params: Mapping, dataset: str | os.PathLike, levels: str | os.PathLi
 
 def scaled_designs(data: xr.Dataset, factors) -> np.ndarray:
     """The plan's designs (experiments, factors), each factor's range from -1 to 1."""
-    return minmax_scale(np.column_stack([data[name].values for name in factors]), (-1, 1))
+    designs = np.column_stack([data[name].values for name in factors])
+    return range_scaling(designs).normalise(designs)
 
 
 def main_effects(data: xr.Dataset, factors) -> pd.DataFrame:
@@ -110,8 +111,8 @@ def analysis_of_variance(data: xr.Dataset, factors) -> pd.DataFrame:
         table.loc["noise", "mean_square"] = noise
         residual = table.loc["residual", "mean_square"]
         table.loc[fitted, "F"] = table.loc[fitted, "mean_square"] / residual
-        table.loc[fitted, "p"] = f.sf(table.loc[fitted, "F"], 1, freedom)
-        table.loc["residual", ["F", "p"]] = residual / noise, f.sf(residual / noise, freedom, repeats)
+        table.loc[fitted, "p"] = fdtrc(1, freedom, table.loc[fitted, "F"])
+        table.loc["residual", ["F", "p"]] = residual / noise, fdtrc(freedom, repeats, residual / noise)
         parts.append(table.reindex([*table.index[:-2], *list(terms)[len(fitted) :], "residual", "noise"]))
         parts[-1].insert(0, "objective", name)
     table = pd.concat(parts).rename_axis("source").reset_index()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from sklearn.gaussian_process import GaussianProcessRegressor
 
 from hopperopt import files
 from hopperopt.outflow import GRID, objective
@@ -53,9 +54,9 @@ def test_some_of_many_experiments_find_the_hyperparameters_and_all_predict(synth
 def test_the_processes_are_conditioned_once(synthetic, monkeypatch):
     """It takes the cube of the number of experiments, and a search predicts a hundred times."""
     model, fitted = gaussian.fit(synthetic.training(3)), []
-    fit = gaussian.GaussianProcessRegressor.fit
+    fit = GaussianProcessRegressor.fit
     monkeypatch.setattr(
-        gaussian.GaussianProcessRegressor, "fit", lambda self, *data: fitted.append(self) or fit(self, *data)
+        GaussianProcessRegressor, "fit", lambda self, *data: fitted.append(self) or fit(self, *data)
     )
     for _ in range(3):
         model.moments(synthetic.designs, GRID)

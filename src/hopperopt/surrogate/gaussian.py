@@ -16,9 +16,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from hopperopt.surrogate.network import one_thread, range_scaling
 
@@ -100,9 +97,7 @@ class Gaussian:
         """A process per component, conditioned on the training scores: once, as that takes n^3."""
         inputs = self._scaled(self.designs)
         return [
-            GaussianProcessRegressor(
-                ConstantKernel(variance) * Matern(lengths, nu=2.5), alpha=self.noise, optimizer=None
-            ).fit(inputs, scores)
+            _process(variance, lengths, self.noise, optimizer=None).fit(inputs, scores)
             for scores, variance, lengths in zip(self.scores.T, self.variances, self.lengths, strict=True)
         ]
 
@@ -174,12 +169,21 @@ def _components(curves, noise):
     return directions[:count], np.maximum(rest, 0.0)
 
 
+def _process(variance, lengths, noise, **search):
+    """A process that knows the noise in its scores; `search` are scikit-learn's options."""
+    from sklearn.gaussian_process import GaussianProcessRegressor, kernels  # slow to import
+
+    kernel = kernels.ConstantKernel(variance, VARIANCES) * kernels.Matern(lengths, LENGTHS, nu=2.5)
+    return GaussianProcessRegressor(kernel, alpha=noise, **search)
+
+
 def _hyperparameters(inputs, scores, noise):
     """Variance and correlation lengths of a process: those that make its scores likeliest."""
+    from sklearn.exceptions import ConvergenceWarning
+
     factors = inputs.shape[1]
     start = float(np.clip(np.var(scores), *VARIANCES))
-    kernel = ConstantKernel(start, VARIANCES) * Matern(np.ones(factors), LENGTHS, nu=2.5)
-    process = GaussianProcessRegressor(kernel, alpha=noise, n_restarts_optimizer=RESTARTS, random_state=0)
+    process = _process(start, np.ones(factors), noise, n_restarts_optimizer=RESTARTS, random_state=0)
     with warnings.catch_warnings():
         # A factor without effect takes its length to the bound, as it should.
         warnings.simplefilter("ignore", ConvergenceWarning)
