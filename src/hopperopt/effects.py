@@ -17,7 +17,6 @@ import xarray as xr
 from scipy.special import fdtrc
 
 from hopperopt import files, outflow
-from hopperopt.surrogate.network import range_scaling
 from hopperopt.uncertainty import Estimate
 
 OUTPUTS = outflow.SIZE_CLASSES[:2]  # whose objectives there are
@@ -48,7 +47,8 @@ def effects(params: Mapping, dataset: str | os.PathLike, levels: str | os.PathLi
 def scaled_designs(data: xr.Dataset, factors) -> np.ndarray:
     """The plan's designs (experiments, factors), each factor's range from -1 to 1."""
     designs = np.column_stack([data[name].values for name in factors])
-    return range_scaling(designs).normalise(designs)
+    low, high = designs.min(axis=0), designs.max(axis=0)
+    return (2 * designs - low - high) / np.where(high > low, high - low, 1.0)
 
 
 def main_effects(data: xr.Dataset, factors) -> pd.DataFrame:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from .forked import snakemake_in_fork
+from .forked import forked_python, snakemake_in_fork
 
 CLONE = Path(__file__).resolve().parents[2]
 SIMULATIONS = ("simulate", "verify_simulate")
@@ -62,11 +62,11 @@ class Study:
         """Start Snakemake; return the process, of a group of its own."""
         return self.start([sys.executable, "-m", "snakemake", *self._options, *options])
 
-    def ask(self, *options):
-        """What Snakemake answers where nothing is to run; as `snakemake`, and cheaper."""
+    def ask(self, *options, **python):
+        """What Snakemake answers where nothing is to run, or where forks do; as `snakemake`, and cheaper."""
         with tempfile.NamedTemporaryFile() as output:
             options = [*self._options, *options]
-            return snakemake_in_fork(options, self.directory, self.environment, output.name)
+            return snakemake_in_fork(options, self.directory, self.environment, output.name, **python)
 
     @property
     def _options(self):
@@ -165,7 +165,7 @@ def finished(tmp_path_factory, worker_id, new_study):
             return Study(shared / "study")
         shutil.rmtree(shared / "study", ignore_errors=True)
         study = new_study(shared / "study", CONFIG, plan=PLAN)
-        answer = study.snakemake()
+        answer = study.ask(python=forked_python(tmp_path_factory.mktemp("python")))
         assert answer.returncode == 0, answer.stdout
         (shared / "study.complete").touch()
         return study
