@@ -37,14 +37,13 @@ def draw(dataset: xr.Dataset) -> Figure:
     for row, panel in enumerate(panels):
         for name, mean, band in zip(dataset["size_class"].values, runs.mean[row], half[row], strict=True):
             colour = style.COLOURS[name]
-            panel.axhline(target.sel(size_class=name), color=colour, linewidth=0.5, alpha=0.7)
+            panel.axhline(float(target.sel(size_class=name)), color=colour, linewidth=0.5, alpha=0.7)
             if np.isfinite(mean).all():
                 panel.fill_between(M, mean - band, mean + band, color=colour, alpha=0.25, linewidth=0)
                 panel.plot(M, mean, color=colour, clip_on=False)
         if not runs.number[row].any():
             panel.text(0.5, 0.5, "no complete run", ha="center", va="center", color=style.FAINT)
-    columns = panels[0].get_subplotspec().get_gridspec().ncols
-    for panel in panels[columns - 1 :: columns]:
+    for panel in multiples.last_column(panels):
         labels.at_ends(
             panel, {style.SYMBOLS[k]: (float(target.sel(size_class=k)), c) for k, c in style.COLOURS.items()}
         )

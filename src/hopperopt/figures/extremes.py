@@ -73,10 +73,10 @@ def _draw_hopper(axes: Axes, sketch: Sketch, walls: Mapping, limits: Sequence[fl
     if "insert" in walls:
         across, size = 2 * walls["insert"][:, 0].max(), np.ptp(walls["insert"][:, 1])
         facts.append(f"insert ⌀ {across:.3g} mm, {size:.3g} mm high; gap {sketch.gap:.2f} coarse diameters")
-        ends = geometry.closest(walls["insert"], walls["hopper"])
-        level = ends[0][1] == ends[1][1]
+        start, end = geometry.closest(walls["insert"], walls["hopper"])
+        level = start[1] == end[1]
         away = (0, -1) if level else (-3, -1)
-        hopper.dimension(axes, *ends, f"{sketch.gap * sketch.coarse:.3g} mm", away, "top")
+        hopper.dimension(axes, start, end, f"{sketch.gap * sketch.coarse:.3g} mm", away, "top")
         if (opening := geometry.opening_radius(walls["insert"])) > 0:
             at = walls["insert"][walls["insert"][:, 0].argmin(), 1]
             hopper.dimension(axes, (-opening, at), (opening, at), f"⌀ {2 * opening:.3g} mm", (0, 1), "bottom")

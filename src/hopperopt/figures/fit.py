@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,10 +15,8 @@ from hopperopt.surrogate import prediction
 
 HEADROOM = 1.2  # for the words at the top of a panel
 TINTS = {"validation": "#E6F4F0", "test": "#F8EBF3"}
-MARKERS, HOLLOW = (
-    {"validation": "s", "test": "o"},
-    {"markerfacecolor": "white", "markersize": 2.5, "clip_on": False},
-)
+MARKERS = {"validation": "s", "test": "o"}
+HOLLOW: Mapping[str, Any] = {"markerfacecolor": "white", "markersize": 2.5, "clip_on": False}
 
 
 def write(
@@ -53,16 +52,15 @@ def draw(training: xr.Dataset, predicted: np.ndarray) -> Figure:
         for column, name in enumerate(training["output"].values):
             _draw_output(panel, experiment.sel(output=name), predicted[row, column], style.COLOURS[name])
         _mark_use(panel, experiment)
-    columns = panels[0].get_subplotspec().get_gridspec().ncols
     batch = training["target_fraction"].to_series()
-    for panel in panels[columns - 1 :: columns]:
+    for panel in multiples.last_column(panels):
         labels.at_ends(panel, {style.SYMBOLS[k]: (m, style.COLOURS[k]) for k, m in batch.items()})
     return figure
 
 
 def _draw_output(panel: Axes, output: xr.Dataset, predicted: np.ndarray, colour: str) -> None:
     M, simulated, target = (output[name].values for name in ("M", "target", "target_clipped"))
-    panel.axhline(output["target_fraction"], color=colour, linewidth=0.5, alpha=0.5)
+    panel.axhline(output["target_fraction"].item(), color=colour, linewidth=0.5, alpha=0.5)
     panel.plot(M, target, color=colour, linestyle=":", clip_on=False)
     panel.plot(M, predicted, color=colour, clip_on=False)
     moved = simulated != target

@@ -146,7 +146,7 @@ def picture(run, position, colours, side, limits, resolution) -> np.ndarray:
         centre[shown],
         PER_M * run["diameter"].values[shown] / 2,
         colours[shown],
-        spheres.View(*limits, resolution=resolution),
+        spheres.View._make((*limits, resolution)),
         depth=limits[1],
     )
 

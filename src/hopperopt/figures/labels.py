@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.text import Text
+from matplotlib.text import Annotation, Text
+from scipy.optimize import isotonic_regression
 
 from hopperopt.figures import style
 
@@ -17,22 +18,16 @@ ALIGN, ALIGN_UP = {1: "left", 0: "center", -1: "right"}, {1: "bottom", 0: "cente
 
 def spread(positions: Sequence[float], distance: float) -> np.ndarray:
     """Move positions as little as needed to be `distance` apart, in their order."""
-    positions = np.asarray(positions, dtype=float)
-    order = np.argsort(positions, kind="stable")
-    offsets = distance * np.arange(len(positions))
-    # With the offsets taken off, "apart" reads "not falling": least squares by pooling neighbours.
-    blocks = []
-    for value in positions[order] - offsets:
-        blocks.append([value, 1])
-        while len(blocks) > 1 and blocks[-2][0] > blocks[-1][0]:
-            (low, few), (high, many) = blocks[-2:]
-            blocks[-2:] = [[(low * few + high * many) / (few + many), few + many]]
-    moved = np.empty_like(positions)
-    moved[order] = np.concatenate([np.full(count, value) for value, count in blocks] or [[]]) + offsets
+    wished = np.asarray(positions, dtype=float)
+    order = np.argsort(wished, kind="stable")
+    offsets = distance * np.arange(len(wished))
+    moved = np.empty_like(wished)
+    # With the offsets taken off, "apart" reads "not falling".
+    moved[order] = isotonic_regression(wished[order] - offsets).x + offsets
     return moved
 
 
-def at_points(axes: Axes, labels: Mapping[str, tuple[float, float]], others: np.ndarray) -> list[Text]:
+def at_points(axes: Axes, labels: Mapping[str, tuple[float, float]], others: np.ndarray) -> list[Annotation]:
     """Write labels {text: (x, y)} beside their points, where they cover least, farther ones with a line.
 
     others (n, 2): further points of the axes to keep clear of.
@@ -40,7 +35,7 @@ def at_points(axes: Axes, labels: Mapping[str, tuple[float, float]], others: np.
     axes.autoscale_view()  # transData would lag behind the data
     own = axes.transData.transform(np.reshape(list(labels.values()), (-1, 2)))
     points = np.vstack([axes.transData.transform(np.reshape(others, (-1, 2))), own])
-    frame, texts = axes.get_window_extent(), []
+    frame, texts = axes.get_window_extent(), list[Annotation]()
     for index, (text, place) in enumerate(labels.items()):
         label = axes.annotate(
             text,
@@ -61,6 +56,7 @@ def at_points(axes: Axes, labels: Mapping[str, tuple[float, float]], others: np.
             costs.append((cost, distance, direction))
         _, distance, direction = min(costs, key=lambda choice: choice[0])
         _moved(label, distance, direction)
+        assert label.arrow_patch is not None  # it has arrowprops
         label.arrow_patch.set_visible(distance > DISTANCES[0])
         texts.append(label)
     return texts
@@ -80,7 +76,7 @@ def _moved(label, distance=None, direction=None):
     return Text.get_window_extent(label)  # the label's own box holds its line as well
 
 
-def at_ends(axes: Axes, labels: Mapping[str, tuple[float, str]]) -> list[Text]:
+def at_ends(axes: Axes, labels: Mapping[str, tuple[float, str]]) -> list[Annotation]:
     """Write labels {text: (y, colour)} at the right of the axes, at the height of their lines.
 
     Call when the limits of y are final.

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import xarray as xr
 from matplotlib.axes import Axes
@@ -24,6 +24,16 @@ def some(data: xr.Dataset) -> xr.Dataset:
     return data.isel(experiment=slice(None, None, -(-data.sizes["experiment"] // MOST_PANELS)))
 
 
+def _columns(count: int) -> int:
+    return min(COLUMNS, math.ceil(math.sqrt(count)))
+
+
+def last_column(panels: Sequence[Axes]) -> Sequence[Axes]:
+    """Those of a grid's panels that stand at its right edge."""
+    columns = _columns(len(panels))
+    return panels[columns - 1 :: columns]
+
+
 def grid(data: xr.Dataset, key: Mapping[str, Mapping] | None = None) -> tuple[Figure, list[Axes]]:
     """Page with a panel for each experiment, headed by its number and the values of its factors.
 
@@ -32,7 +42,7 @@ def grid(data: xr.Dataset, key: Mapping[str, Mapping] | None = None) -> tuple[Fi
     limits of y are shared and yet to be set.
     """
     count = data.sizes["experiment"]
-    columns = min(COLUMNS, math.ceil(math.sqrt(count)))
+    columns = _columns(count)
     rows = math.ceil(count / columns)
     width = FRAME.left + FRAME.right + columns * PANEL[0] + (columns - 1) * GAPS[0]
     frame = FRAME._replace(top=FRAME.top + KEY) if key else FRAME

@@ -47,8 +47,7 @@ def draw(verdict: pd.DataFrame, designs: pd.DataFrame) -> Figure:
         for at, (case, row) in enumerate(rows.iterrows()):
             _draw_case(panel, at, row)
             if case == "plan_best":
-                in_plan = best[[name, f"{name}_low", f"{name}_high"]]
-                _draw_value(panel, at + SHIFT, *in_plan, IN_PLAN)
+                _draw_value(panel, at + SHIFT, best[name], best[f"{name}_low"], best[f"{name}_high"], IN_PLAN)
         panel.set(ylim=(len(cases) - 0.5, -0.5), xlabel=style.OBJECTIVES[name])
         panel.set_yticks(range(len(cases)), [case.replace("_", " ") for case in cases])
         panel.tick_params(axis="y", length=0, labelleft=name == features.OUTPUTS[0])
