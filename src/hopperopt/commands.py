@@ -179,7 +179,6 @@ def _render(given: argparse.Namespace) -> None:
     else:
         from hopperopt.figures import movie
 
-        logging.getLogger("matplotlib").setLevel(logging.WARNING)  # it tells of each writer
         written = movie.write(given.run, stem, given.colour, given.format)
     print("\n".join(map(str, written)))
 

@@ -13,13 +13,14 @@ from typing import NamedTuple
 from hopperopt import checkpoint, files
 
 INTERVAL = 3.0  # s between two beats
+STARTING = ("starting", "compiling")  # stages before the first time step, one beat in all
 
 
 class Beat(NamedTuple):
     """What a simulation said last, and how long ago."""
 
     output: str  # as seen from the state directory
-    stage: str  # "starting", "filling", "settling" or "discharge"
+    stage: str  # one of STARTING, then "filling", "settling" or "discharge"
     time: float  # s simulated in the filling or since the opening
     discharged: float  # share of the particles
     rate: float  # particle-steps per second
@@ -31,12 +32,16 @@ class Beat(NamedTuple):
 
 @contextmanager
 def beating(
-    output: Path, state_dir: Path, particles: int, clock: Callable[[], float] = time.monotonic
+    output: Path,
+    state_dir: Path,
+    particles: int,
+    stage: str = "starting",
+    clock: Callable[[], float] = time.monotonic,
 ) -> Iterator[Callable]:
     """Give a function of progress reports that writes the last one every few seconds; the end removes it.
 
-    Only for who holds the lock of `output`. particles: their number at the start. A file that cannot be
-    written stops no simulation.
+    Only for who holds the lock of `output`. particles: their number at the start; stage: what is at
+    work before the first report. A file that cannot be written stops no simulation.
     """
     path = _file(output, state_dir)
     files.remove_leftovers(path)
@@ -55,7 +60,7 @@ def beating(
             said = {name: getattr(report, name) for name in ("stage", "time", "rate", "remaining")}
             write(**said, discharged=discharged)
 
-    write(stage="starting", time=0.0, rate=0.0, remaining=None, discharged=0.0)
+    write(stage=stage, time=0.0, rate=0.0, remaining=None, discharged=0.0)
     try:
         yield beat
     finally:

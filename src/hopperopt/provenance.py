@@ -7,6 +7,7 @@ import ast
 import functools
 import hashlib
 import json
+import logging
 import os
 import platform
 import subprocess
@@ -178,19 +179,29 @@ def numba_cache_lock() -> Iterator[None]:
         yield
 
 
+def is_compiled(threads: int = 1) -> bool:
+    """Whether the solver for so many threads is in the cache."""
+    return _mark(threads).exists()
+
+
 def compile_solver(threads: int = 1) -> None:
     """Compile the solver for so many threads, or load it compiled: before a process's first time step.
 
     Who compiles marks the cache at its end, so that all others load at the same time and not one by one.
     """
-    compiled = use_numba_cache() / f"compiled-{_compiled_from(threads > 1)}"
+    compiled = _mark(threads)
     if not compiled.exists():
+        logging.info("compiling the solver, once for this code and kind of processor: a minute or two")
         with numba_cache_lock():
             if not compiled.exists():
                 _load_solver(threads)
                 compiled.touch()
                 return
     _load_solver(threads)
+
+
+def _mark(threads: int) -> Path:
+    return use_numba_cache() / f"compiled-{_compiled_from(threads > 1)}"
 
 
 def _compiled_from(parallel: bool) -> str:

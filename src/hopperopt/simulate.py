@@ -38,7 +38,8 @@ def simulate(
     with checkpoint.working_on(output, state_dir, stamp, checkpoint_minutes) as (kept, waited):
         run = _finished(output, origin) if waited else None
         if run is None:
-            with heartbeat.beating(output, state_dir, sum(case["particles"]["counts"])) as beat:
+            stage = "starting" if provenance.is_compiled(threads) else "compiling"
+            with heartbeat.beating(output, state_dir, sum(case["particles"]["counts"]), stage) as beat:
                 run = _run(case, threads, kept, beat)
             _describe(run)
             run.attrs |= provenance.attributes() | origin

@@ -16,9 +16,8 @@ from hopperopt import heartbeat
 from hopperopt.heartbeat import Beat
 from hopperopt.progress import duration
 
-# Time (s) without a beat after which a simulation may have ended: at the start it may be compiling, later it
-# beats every few seconds.
-SILENT, SILENT_LATER = {"starting": 600.0}, 60.0
+# Time (s) without a beat after which a simulation may have ended: before its first step, and later.
+SILENT, SILENT_LATER = 600.0, 60.0
 REDRAW = 2.0  # s
 BAR = 24  # characters
 CLEAR = "\x1b[H\x1b[J"
@@ -103,7 +102,7 @@ def look(runs: Sequence[Run], state_dir: Path) -> Seen:
 
 
 def _is_alive(beat: Beat) -> bool:
-    return beat.age < SILENT.get(beat.stage, SILENT_LATER)
+    return beat.age < (SILENT if beat.stage in heartbeat.STARTING else SILENT_LATER)
 
 
 def _finished(path: Path) -> Finished | None:

@@ -68,6 +68,16 @@ def test_a_simulation_has_a_heartbeat_and_a_log_while_it_runs(simulated, capsys,
     assert not Path("results/.state").exists()
 
 
+def test_a_simulation_that_waits_for_the_compiler_says_so(simulated, capsys, monkeypatch, tmp_path):
+    """Its heartbeat and its log: that is a silent minute otherwise, once in each new environment."""
+    monkeypatch.setattr(provenance, "_mark", lambda threads: tmp_path / "compiled")
+    simulated()
+    assert [beat.stage for beat in simulated.beats] == ["compiling"]
+    (tmp_path / "compiled").touch()
+    simulated()
+    assert [beat.stage for beat in simulated.beats[1:]] == ["starting"]
+
+
 def test_the_log_begins_with_versions_and_the_resolved_case(simulated, caplog):
     caplog.set_level("INFO")
     case, _ = simulated("--theta", "57.5")

@@ -101,9 +101,9 @@ def test_one_that_was_killed_is_told_and_counted_as_to_come(study):
 
 
 def test_a_compilation_is_given_ten_minutes(study):
-    study.beat(0, age=190, stage="starting", rate=0.0, remaining=None)
+    study.beat(0, age=190, stage="compiling", rate=0.0, remaining=None)
     assert "1 running" in study.screen()
-    study.beat(0, age=700, stage="starting", rate=0.0, remaining=None)
+    study.beat(0, age=700, stage="compiling", rate=0.0, remaining=None)
     assert "no sign of life" in study.screen()
 
 
