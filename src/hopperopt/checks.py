@@ -3,6 +3,7 @@
 Works on the models' attributes alone. A refusal or warning about designs is said once, for the worst of them.
 """
 
+import bisect
 import difflib
 import re
 from contextlib import suppress
@@ -14,6 +15,7 @@ from hopperopt.document import ConfigError, dotted_keys, mistake
 SIMULATED = {"hopper", "insert", "particles", "wall", "contact", "filling", "discharge", "simulation"}
 MOST_RUNS = 10_000  # of the plan, and of the verification
 MOST_CORNERS = 256
+HEIGHTS = range(1, 100_000)  # mm
 FOLDS = 5  # of the cross-validation
 
 
@@ -252,9 +254,24 @@ def warnings(study):
     corners = plans.corners(study.levels) if 2 ** len(study.factors) <= MOST_CORNERS else []
     extremes = [("a corner", corner, study.with_design(corner)) for corner in corners]
     refused = _grouped(extremes, findings.refused)
+    found += _other_level(study)
     found += _narrow_plan(study)
     found += _far_cases(study)
     return found + [f"the optimiser may propose designs that are refused: {sentence}" for sentence in refused]
+
+
+def _other_level(study):
+    """A fixed number of particles that fills the hopper to quite another level than the one that is named."""
+    *_, setup = designs(study)[0]
+    count, level = setup.filling.particles, setup.filling.level_mm
+    if count is None:
+        return
+    reached = bisect.bisect(HEIGHTS, count, key=lambda height: setup.particles_up_to(height / findings.MM))
+    if abs(reached - level) > 2 * setup.particles.diameters_mm[-1]:
+        yield (
+            f"filling.level_mm: {count} particles fill the hopper to about {reached} mm, not {level:g} mm; "
+            "the height of their fall, drawing, warnings and logs go by that level"
+        )
 
 
 def _narrow_plan(study):

@@ -399,7 +399,10 @@ class Setup(Model):
         """The fixed number, or what fills the hopper around its insert up to the level."""
         if self.filling.particles is not None:
             return self.filling.particles
-        level = self.filling.level_mm / MM
+        return self.particles_up_to(self.filling.level_mm / MM)
+
+    def particles_up_to(self, level):
+        """Number of particles that fill the hopper around its insert up to a level (m)."""
         volume = geometry.volume_inside(self.hopper.profile(level), level)
         if self.insert_profile is not None:
             volume -= geometry.solid_volume(self.insert_profile, level)

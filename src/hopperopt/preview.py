@@ -103,7 +103,7 @@ def _geometry(study, designs):
 def _time_step(designs):
     worst = designs.steps.argmax()
     setup, share = designs.known[worst][2], designs.steps[worst]
-    text = f"{setup.time_step:g} s, {share:.2f} Rayleigh times of the smallest particles"
+    text = f"{setup.time_step:.3g} s, {share:.2f} Rayleigh times of the smallest particles"
     if share > findings.USUAL_STEP:
         tested = ", tested for materials like these" if findings.tested(setup, share) else ""
         text += f": above the usual {findings.USUAL_STEP}{tested} (time_step_s: auto takes 0.2)"
@@ -129,8 +129,8 @@ def _cost(study, designs):
         "one simulation": f"{between(map(duration, dearest))} on a core, "
         f"{max(each.steps for each in costs):,.0f} steps, {memory:.0f} MB",
         "all simulations": f"{between(duration(seconds / cores) for seconds in total)} on this machine's "
-        f"{cores} cores (fast to slow or busy machine), {memory * cores / MM:.1f} GB; the surrogate's "
-        "training and the figures come on top",
+        f"{cores} cores (fast to slow or busy machine), {memory * cores / MM:.1f} GB; the solver's "
+        "compilation, once, the surrogate's training and the figures come on top",
     }
 
 

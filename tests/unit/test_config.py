@@ -347,6 +347,14 @@ def test_insert_that_blocks_is_refused_and_a_narrow_gap_is_a_warning():
     assert "exp_21: theta_deg 50, length_mm 50, height_mm 26" in narrow
 
 
+def test_a_fixed_number_of_particles_that_misses_the_level_is_a_warning():
+    count, key = config.parse({}).particle_count, "filling.level_mm"
+    few, right = ({"filling": {"particles": number}} for number in (999, count))
+    (line,) = [line for line in config.parse(few).warnings() if line.startswith(key)]
+    assert "999 particles fill the hopper to about 12 mm, not 74 mm" in line
+    assert not [line for line in config.parse(right).warnings() if line.startswith(key)]
+
+
 def test_apex_above_the_bed_is_only_a_warning():
     (line,) = [line for line in config.parse({}).warnings() if "its top" in line]
     assert "77.3 mm" in line and "exp_01" in line and "and 1 more" in line
