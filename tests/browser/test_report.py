@@ -86,6 +86,17 @@ def test_nothing_overlaps_or_spills_over(opened, width):
     assert (upon, too_wide, words) == (0, 0, [])
 
 
+def test_bands_stay_inside_their_charts(opened):
+    above = """
+    return [...document.querySelectorAll(".outflow svg")].map(svg => {
+      const top = element => element.getBoundingClientRect().top;
+      const bands = [...svg.querySelectorAll(".band")];
+      return top(svg.querySelector(".axis")) - Math.min(...bands.map(top));
+    });"""
+    found = opened().execute_script(above)
+    assert found and max(found) < 1
+
+
 def test_pointing_at_a_curve_shows_its_experiment(opened):
     browser = opened()
     move_to(browser, "#curve-chart svg")

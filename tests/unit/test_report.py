@@ -1,5 +1,6 @@
 """The report's page is whole and asks for nothing outside; its sentences hold whatever the study found."""
 
+import base64
 import json
 import re
 from html.parser import HTMLParser
@@ -9,6 +10,7 @@ import pandas as pd
 import pytest
 
 from hopperopt import files
+from hopperopt.figures import style
 from hopperopt.report import answer, charts, drawing, facts, page
 from hopperopt.report.study import rounds
 
@@ -171,9 +173,22 @@ PREDICTED = {"J_fine": 0.0117, "J_intermediate": 0.0338, "expected_improvement":
 
 
 def test_figures_are_part_of_the_file(make_report_study, tmp_path):
-    (tmp_path / "errors.png").write_bytes(b"picture")
-    text = page.render(*rendering(make_report_study(), {"errors": tmp_path / "errors.png"}))
-    assert 'src="data:image/png;base64,cGljdHVyZQ=="' in text
+    """All in one scale, whatever their resolution: letters of one size."""
+    sizes = {"errors": (style.PAGE, 50), "verification": (style.COLUMN, 100)}
+    for name, (width, dpi) in sizes.items():
+        style.save(style.page(width, 40), [tmp_path / f"{name}.png"], dpi)
+    text = page.render(*rendering(make_report_study(), {name: tmp_path / f"{name}.png" for name in sizes}))
+    source = base64.b64encode((tmp_path / "errors.png").read_bytes()).decode()
+    assert f'src="data:image/png;base64,{source}" style="width: 52rem"' in text
+    assert 'style="width: 25rem" alt="Predicted and simulated outflow' in text
+
+
+def test_the_bed_is_drawn_as_high_as_it_was(make_report_study):
+    study, *rest = rendering(make_report_study())
+    for number, run in enumerate((study.plan | study.verification).values()):
+        run["filling_level"] = 0.0361 if number else 0.0345
+    text = page.render(study, *rest)
+    assert "bed 36.1 mm" in text and "34.5 to 36.1 mm above the outlet, aimed at 74 mm" in text
 
 
 def table(selected=("better", "better"), simulated=0.012, bare=0.03, z=0.5):

@@ -57,6 +57,9 @@ function chart(container, x, y, xLabel, yLabel, right, shape = 0.7) {
 const known = values => values.every(value => value !== null);
 const line = (c, values) => "M" + values.map((value, n) => `${c.X(M[n]).toFixed(1)},${c.Y(value).toFixed(1)}`).join("L");
 
+/* Lower and upper edge of a band; of one that is not known the curve. */
+const edges = (mean, half) => [-1, 1].flatMap(side => mean.map((value, n) => value + side * (half[n] ?? 0)));
+
 function band(c, parent, mean, half, colour) {
   if (!known(half)) return;
   const upper = line(c, mean.map((value, n) => value + half[n]));

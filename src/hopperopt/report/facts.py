@@ -25,8 +25,11 @@ KINDS = {
 }
 
 
-def conditions(case: Mapping, counts: Iterable[int]) -> Rows:
-    """What all simulations share, (quantity, value); case: of one of them; counts: their particle numbers."""
+def conditions(case: Mapping, counts: Iterable[int], levels: Sequence[float]) -> Rows:
+    """What all simulations share, (quantity, value).
+
+    case: of one of them; counts: their particle numbers; levels (mm): of their settled beds.
+    """
     spheres, wall, contact, filling = (case[name] for name in ("particles", "wall", "contact", "filling"))
     diameters = [f"{1e3 * d:.3g}" for d in spheres["diameters"]]
     names = ", ".join(f"{k} {d} mm" for k, d in zip(outflow.SIZE_CLASSES, diameters, strict=True))
@@ -46,10 +49,11 @@ def conditions(case: Mapping, counts: Iterable[int]) -> Rows:
     ):  # fmt: skip
         pair = _two(_short, contact["particle"][key], contact["wall"][key])
         rows.append((f"{name}, between particles and with walls", pair))
+    reached = " to ".join(dict.fromkeys(f"{level:.3g}" for level in (min(levels), max(levels))))
     return [
         *rows,
         ("rolling resistance", ROLLING.get(contact["rolling"], contact["rolling"])),
-        ("settled bed", f"up to {1e3 * filling['level']:.4g} mm above the outlet"),
+        ("settled bed", f"{reached} mm above the outlet, aimed at {1e3 * filling['level']:.4g} mm"),
         ("counted as discharged", f"{-1e3 * case['discharge']['sensor']:.3g} mm below the outlet"),
         ("time step", f"{1e6 * case['time_step']:.3g} µs"),
     ]

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 import jinja2
+from PIL import Image
 
 from hopperopt import files
 from hopperopt.figures import style
@@ -13,6 +14,7 @@ from hopperopt.report import charts, sections
 from hopperopt.report.study import Study, read
 
 TEMPLATES = Path(__file__).parent
+WIDEST = 52.0  # rem, of a figure as wide as a page in print
 # Figures of the study that the page shows, with what they show for who cannot see them.
 ALTERNATIVES = {
     "indices": "Indices of segregation and flow of the plan's designs, the least segregating first.",
@@ -82,7 +84,7 @@ def render(
             **sections.judged(study),
             **sections.provenance(study),
             "colours": style.COLOURS,
-            "figures": {name: _png(path) for name, path in figures.items()},
+            "figures": {name: _picture(path) for name, path in figures.items()},
             "alternatives": ALTERNATIVES,
             "data": {
                 "curves": charts.curves(study.data, list(study.keys)),
@@ -94,5 +96,9 @@ def render(
     )
 
 
-def _png(path: str | os.PathLike) -> str:
-    return f"data:image/png;base64,{base64.b64encode(Path(path).read_bytes()).decode()}"
+def _picture(path: str | os.PathLike) -> dict:
+    """A PNG file as `source`, and its `width` (rem) on the page: all in one scale, that of print."""
+    with Image.open(path) as image:
+        width = image.width / image.info["dpi"][0] / style.MM
+    source = f"data:image/png;base64,{base64.b64encode(Path(path).read_bytes()).decode()}"
+    return {"source": source, "width": WIDEST * width / style.PAGE}

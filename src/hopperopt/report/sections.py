@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 import yaml
 
 from hopperopt import dataset, uncertainty, verify
@@ -19,12 +20,14 @@ def opening(study: Study) -> dict:
     run = study.shown(name)
     shown = case(run)
     dropped = sum(len(dataset.unusable_runs(runs)) for runs in (study.plan, study.infill, study.verification))
-    lines, limits = drawing.dimensions(hopper.walls_of(shown), drawing.PER_M * shown["filling"]["level"])
+    level = _level(run)
+    lines, limits = drawing.dimensions(hopper.walls_of(shown), level)
     return {
         "answer": answer.answer(study.kinds, study.verdict, study.undetectable, dropped),
         "design": _in_words(study),
         "rule": study.selected["rule"],
         "shown": _drawing(shown),
+        "level": level,
         "dimensions": lines,
         "drawing_box": drawing.view_box(limits),
         "letter": (limits[1] - limits[0]) / 34,
@@ -48,8 +51,14 @@ def _half_angle(case):
     return float(np.degrees(np.arctan2(r2 - r1, z2 - z1)))
 
 
+def _level(run: xr.Dataset) -> float:
+    """Level (mm) of a run's settled bed; what it should have been of a filling that blew up."""
+    reached = float(run["filling_level"])
+    return drawing.PER_M * (reached if np.isfinite(reached) else case(run)["filling"]["level"])
+
+
 def _drawing(case: Mapping) -> dict:
-    """Outlines of a case's walls, and its levels in mm."""
+    """Outlines of a case's walls, in mm."""
     walls = hopper.walls_of(case)
     return {
         "hopper": drawing.outline(walls["hopper"]).path,
@@ -58,7 +67,6 @@ def _drawing(case: Mapping) -> dict:
         "hopper_radius": walls["hopper"][:, 0].max(),
         "outlet": walls["gate"][:, 0].max(),
         "sensor": -drawing.PER_M * case["discharge"]["sensor"],
-        "level": drawing.PER_M * case["filling"]["level"],
         "words": answer.design_words(case["design"]),
     }
 
@@ -66,10 +74,11 @@ def _drawing(case: Mapping) -> dict:
 def studied(study: Study, settings: Mapping) -> dict:
     """What was studied, and how."""
     first = case(next(iter(study.plan.values())))
-    counts = [int(found["particle_count"]) for found in (study.plan | study.verification).values()]
+    runs = (study.plan | study.verification).values()
+    counts, levels = [int(run["particle_count"]) for run in runs], [_level(run) for run in runs]
     batch = study.data["target_fraction"].values
     return {
-        "conditions": facts.conditions(first, counts),
+        "conditions": facts.conditions(first, counts, levels),
         "factors": facts.factors(study.data, study.keys, study.selected["design"]),
         "batch": [answer.percent(share, 1) for share in batch],
         "experiments": study.data.sizes["experiment"],
