@@ -293,6 +293,19 @@ def test_front_and_verdict_can_be_read(make_plan, found, cases):
     assert words.count("plan best") == 1 and words.count("better") == 6 and words.count("worse") == 2
 
 
+def test_a_front_of_hardly_any_length_is_not_blown_up(make_plan):
+    found = table_of_front()
+    for name in front.COLUMNS:
+        found[name] = 0.0333 + 1e-6 * found[name]
+    figure = front.draw(found, make_plan(10), table_of_cases())
+    check_texts(figure)
+    near = figure.axes[0]
+    for axis, name in zip((near.xaxis, near.yaxis), front.COLUMNS, strict=True):
+        low, high = axis.get_view_interval()
+        assert np.diff([low, found[name].min(), found[name].max(), high]).min() >= 0
+        assert high - low == pytest.approx(front.CLOSEST) and axis.get_offset_text().get_text() == ""
+
+
 @pytest.mark.parametrize("feasible", [True, False])
 def test_designs_of_infill_have_a_mark_of_their_own(make_plan, feasible):
     plan = make_plan(10)
@@ -344,6 +357,13 @@ def test_errors_can_be_read_and_tell_the_surrogate_that_is_used():
 @pytest.mark.parametrize("plan", [{}, {"experiments": 1}, {"experiments": 7, "replicates": 3}])
 def test_indices_can_be_read(make_plan, plan):
     check_texts(indices.draw(make_plan(**plan)))
+
+
+def test_an_index_that_no_run_has_is_told(make_plan):
+    plan = make_plan(7)
+    figure = indices.draw(plan.assign(mass_flow_index=np.nan * plan["mass_flow_index"]))
+    (words,) = [text for text in check_texts(figure) if text.get_text() == "not measured"]
+    assert words.axes.get_title(loc="left") == "mass-flow index" and words.axes.get_yticks().size == 0
 
 
 def test_indices_are_drawn_by_rank_and_as_means_of_runs(make_plan):
@@ -406,6 +426,16 @@ def test_extremes_can_be_read(name):
     figure = extremes.draw(preview.sketches(config.parse(config.load(paths), root)))
     words = " ".join(text.get_text() for text in check_texts(figure))
     assert "smallest gap" in words and "level of the bed, 74 mm" in words
+
+
+def test_extremes_of_small_inserts_can_be_read():
+    lengths = {"key": "insert.cone.length_mm", "levels": [28, 26, 24, 22, 20]}
+    changes = {
+        "hopper": {"outlet_radius_mm": 30, "cylinder_radius_mm": 60},
+        "particles": {"diameters_mm": [5, 6, 8]},
+        "factors": {"length_mm": lengths},
+    }
+    check_texts(extremes.draw(preview.sketches(config.parse(changes))))
 
 
 def test_extremes_of_a_bare_hopper_are_one(run):

@@ -22,6 +22,7 @@ SIMULATED = {"color": style.INK, "marker": "D", "markersize": 4, "markerfacecolo
 PLAN = {"color": "#909090", "marker": "o", "markersize": 2.8, "markerfacecolor": "none"}
 INFILL = {"color": "#0072B2", "marker": "^", "markersize": 3.2, "markerfacecolor": "none"}
 PROPOSED = "infill_"  # begins the names of the designs of infill
+CLOSEST = 5e-4  # least range of a panel; differences in J below it are nothing to look at
 ARROW = {"arrowstyle": "->", "linewidth": 0.6, "color": style.INK, "shrinkB": 3}
 
 
@@ -53,6 +54,7 @@ def draw(front: pd.DataFrame, dataset: xr.Dataset, verdict: pd.DataFrame) -> Fig
         panel.set_title(title, loc="left")
         panel.locator_params(nbins=6)
         _draw_front(panel, front)
+    _keep_away(near)
     _label_selected(near, front)
     proposed = dataset["experiment"].str.startswith(PROPOSED)
     groups = [(PLAN, dataset.isel(experiment=~proposed)), (INFILL, dataset.isel(experiment=proposed))]
@@ -78,6 +80,13 @@ def _draw_front(panel, front):
     panel.plot(*points[feasible].T, **FRONT)
     panel.plot(*points[~feasible].T, linestyle="", **IMPOSSIBLE)
     panel.plot(*points[selected].T, linestyle="", zorder=4, **SELECTED)
+
+
+def _keep_away(panel):
+    """Show at least a range of `CLOSEST`, around a front that is shorter."""
+    for (low, high), limit in ((panel.get_xlim(), panel.set_xlim), (panel.get_ylim(), panel.set_ylim)):
+        half = max(high - low, CLOSEST) / 2
+        limit((low + high) / 2 - half, (low + high) / 2 + half)
 
 
 def _label_selected(panel, front):

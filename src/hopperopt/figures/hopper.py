@@ -171,7 +171,7 @@ def draw_dimensions(axes: Axes, walls: Mapping, limits: Sequence[float]) -> None
     dimension(axes, (-outlet, below), (outlet, below), f"⌀ {2 * outlet:.3g} mm", (0, -1), "top")
     if "insert" in walls:
         r, height = walls["insert"][walls["insert"][:, 1].argmin()]
-        dimension(axes, (-r, 0), (-r, height), f"{height:.3g} mm", (2, 0), "center")
+        dimension(axes, (-r, 0), (-r, height), f"{height:.3g} mm", (-2, 0), "center")
 
 
 def dimension(axes, start, end, text, offset, align):

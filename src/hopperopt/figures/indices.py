@@ -54,6 +54,9 @@ def draw(dataset: xr.Dataset) -> Figure:
             if name == "relative_deviation":
                 random = float(ranked["random_deviation"].sel(size_class=size).mean())
                 panel.axhline(random, color=colour, zorder=0, **RANDOM)
+        if not np.isfinite(values).any():
+            panel.text(0.5, 0.5, "not measured", transform=panel.transAxes, ha="center", color=style.FAINT)
+            panel.set_yticks([])
         panel.set_title(title, loc="left")
         panel.set_xlim(0.2, ranked.sizes["experiment"] + 0.8)
         panel.locator_params(axis="y", nbins=5)
