@@ -26,7 +26,7 @@ rule sensitivity:
         surrogate=result("surrogate/model.nc"),
         dataset=all_data(),
     output:
-        sobol=report(result("analysis/sobol.csv"), caption="../report/sobol.rst", category="Tables"),
+        sobol=report(result("analysis/sobol.csv"), caption="../report/sensitivity.rst", category="Tables"),
     log:
         log_of("sensitivity"),
     params:
