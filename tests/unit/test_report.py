@@ -188,7 +188,7 @@ def test_the_bed_is_drawn_as_high_as_it_was(make_report_study):
     for number, run in enumerate((study.plan | study.verification).values()):
         run["filling_level"] = 0.0361 if number else 0.0345
     text = page.render(study, *rest)
-    assert "bed 36.1 mm" in text and "34.5 to 36.1 mm above the outlet, aimed at 74 mm" in text
+    assert "bed 36 mm" in text and "34.5 to 36.1 mm above the outlet, aimed at 74 mm" in text
 
 
 def table(selected=("better", "better"), simulated=0.012, bare=0.03, z=0.5):

@@ -88,7 +88,7 @@ def dimensions(walls: Mapping[str, np.ndarray], level: float) -> tuple[list[Dime
         Dimension(-widest, -top, widest, -top, f"⌀ {2 * widest:.4g} mm", 0, -top - 0.4 * text, "middle"),
         Dimension(-outlet, step, outlet, step, f"⌀ {2 * outlet:.4g} mm", 0, step + 1.3 * text, "middle"),
     ]
-    lines.append(_height(-widest - step, level, f"bed {level:.3g} mm", "end", text))
+    lines.append(_height(-widest - step, level, f"bed {level:.0f} mm", "end", text))
     if insert is not None:
         base, apex = insert[:, 1].min(), insert[:, 1].max()
         lines.append(_height(widest + step, base, f"{base:.3g} mm", "start", text))
