@@ -51,19 +51,18 @@ function chart(container, x, y, xLabel, yLabel, right, shape = 0.7) {
   }
   add(svg, "text", { x: (left + end) / 2, y: height - 6, "text-anchor": "middle" }, xLabel);
   add(svg, "text", { x: 0, y: 14 }, yLabel);
-  return { svg, X, Y, left, end, top, bottom };
+  return { svg, X, Y, y, left, end, top, bottom };
 }
 
 const known = values => values.every(value => value !== null);
 const line = (c, values) => "M" + values.map((value, n) => `${c.X(M[n]).toFixed(1)},${c.Y(value).toFixed(1)}`).join("L");
 
-/* Lower and upper edge of a band; of one that is not known the curve. */
-const edges = (mean, half) => [-1, 1].flatMap(side => mean.map((value, n) => value + side * (half[n] ?? 0)));
-
+/* A band around a curve, as far as the chart reaches. */
 function band(c, parent, mean, half, colour) {
   if (!known(half)) return;
-  const upper = line(c, mean.map((value, n) => value + half[n]));
-  const lower = mean.map((value, n) => `L${c.X(M[n]).toFixed(1)},${c.Y(value - half[n]).toFixed(1)}`).reverse();
+  const inside = value => Math.min(c.y[1], Math.max(c.y[0], value));
+  const upper = line(c, mean.map((value, n) => inside(value + half[n])));
+  const lower = mean.map((value, n) => `L${c.X(M[n]).toFixed(1)},${c.Y(inside(value - half[n])).toFixed(1)}`).reverse();
   add(parent, "path", { class: "band", d: upper + lower.join("") + "Z", fill: colour });
 }
 

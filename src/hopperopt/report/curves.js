@@ -2,7 +2,7 @@
 for (const container of document.querySelectorAll(".outflow")) {
   const { mean, half } = data.outflows[container.dataset.index];
   keep(container, () => {
-    const high = Math.max(...mean.flatMap((m, k) => edges(m, half[k])), ...batch);
+    const high = Math.max(...mean.flatMap((m, k) => m.map((value, n) => value + half[k][n])), ...batch);
     const c = chart(container, [0, 1], [0, Math.min(1, 1.08 * high)], "M", "mass fraction in the outflow", 12, 0.9);
     if (!known(mean.flat())) { add(c.svg, "text", { x: c.left + 12, y: c.top + 20 }, "no complete run"); return; }
     classes.forEach((name, k) => {
@@ -23,7 +23,7 @@ experiments.forEach((experiment, n) => add(choice, "option", { value: n }, exper
 choice.addEventListener("change", () => highlight(choice.value === "" ? -1 : Number(choice.value)));
 
 function drawCurves() {
-  const complete = experiments.filter(e => known(e.mean[size])).map(e => edges(e.mean[size], e.half[size]));
+  const complete = experiments.map(e => e.mean[size]).filter(known);
   const c = curveChart = chart(curveBox, [0, 1], range([...complete.flat(), batch[size]]),
     "discharged mass fraction M", `mass fraction of the ${classes[size]} particles in the outflow`, 50);
   experiments.forEach((experiment, n) => {
