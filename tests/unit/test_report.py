@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from hopperopt import files
-from hopperopt.figures import style
+from hopperopt.figures import multiples, style
 from hopperopt.report import answer, charts, drawing, facts, page
 from hopperopt.report.study import rounds
 
@@ -90,6 +90,15 @@ def test_the_charts_have_their_data(rendered, make_report_study):
     names = [name for level in length["experiments"] for name in level]
     assert sorted(names) == study.data["experiment"].values.tolist()
     assert np.shape([length["J"]["fine"], length["J"]["intermediate"]]) == (2, 5, 3)
+
+
+def test_of_a_large_plan_some_curves_are_shown_and_the_page_says_so(make_report_study, monkeypatch):
+    monkeypatch.setattr(multiples, "MOST_PANELS", 10)
+    one_case = {"verification": {"cases": {"selected": "selected"}, "replicates_of": {}}}
+    parsed = Page(page.render(*rendering(make_report_study(one_case))))
+    shown = json.loads(parsed.texts["script"][0])["curves"]["experiments"]
+    assert [curve["name"] for curve in shown] == [f"exp_{n:02d}" for n in range(1, 26, 3)]
+    assert any("Shown are 9 of the 25 experiments" in text for text in parsed.texts["p"])
 
 
 def test_a_bin_of_designs_is_told_by_its_range(make_report_study):

@@ -3,6 +3,7 @@ const effectBox = document.getElementById("effect-charts"), effectTold = documen
 const effectCharts = data.effects.map(() => add(effectBox, "div", { class: "chart" }));
 const levelsOf = data.effects.flatMap(effect => effect.levels.map((_, n) => [effect, n]));
 const objectives = Object.keys(data.effects[0].J), putEffects = chooser(effectBox, showEffect);
+const NAMED = 30; // experiments of a level
 let objective = objectives[0];
 
 radios(document.getElementById("effect-sizes"), objectives, k => { objective = objectives[k]; drawEffects(); });
@@ -32,8 +33,9 @@ function drawEffect(box, { name, unit, selected, levels, words, J }, y) {
 function showEffect(place) {
   const [{ name, words, J, experiments }, n] = levelsOf[place], [mean, low, high] = J[objective][n], names = experiments[n];
   const interval = low === null ? "" : ` (${decimals(low)} to ${decimals(high)})`;
+  const more = names.length > NAMED ? ` and ${names.length - NAMED} more` : "";
   const of = names.length > 1 ? `mean of ${names.length} experiments, ` : "";
-  effectTold.textContent = `${name} ${words[n]}: J of the ${objective} particles ${decimals(mean)}${interval}; ${of}${names.join(", ")}`;
+  effectTold.textContent = `${name} ${words[n]}: J of the ${objective} particles ${decimals(mean)}${interval}; ${of}${names.slice(0, NAMED).join(", ")}${more}`;
 }
 
 keep(effectBox, drawEffects);

@@ -9,7 +9,7 @@ import jinja2
 from PIL import Image
 
 from hopperopt import files
-from hopperopt.figures import style
+from hopperopt.figures import multiples, style
 from hopperopt.report import charts, sections
 from hopperopt.report.study import Study, read
 
@@ -74,6 +74,7 @@ def render(
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    shown = multiples.some(study.data)
     environment.policies["json.dumps_kwargs"] = {"ensure_ascii": False, "allow_nan": False}
     return environment.get_template("page.html").render(
         {
@@ -84,10 +85,11 @@ def render(
             **sections.judged(study),
             **sections.provenance(study),
             "colours": style.COLOURS,
+            "shown_experiments": shown.sizes["experiment"],
             "figures": {name: _picture(path) for name, path in figures.items()},
             "alternatives": ALTERNATIVES,
             "data": {
-                "curves": charts.curves(study.data, list(study.keys)),
+                "curves": charts.curves(shown, list(study.keys)),
                 "outflows": sections.outflows(study),
                 "effects": charts.effects(study.effects, study.data, study.words(), study.selected["design"]),
                 "front": sections.front(study, case_of),
