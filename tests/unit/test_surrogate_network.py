@@ -86,7 +86,7 @@ def test_networks_do_not_depend_on_their_batch(monkeypatch):
     training, validation = sample(60, seed=3), sample(30, seed=4)
     start = network.initial_weights(5, INPUTS, OUTPUTS, seeds(12))
     together = levenberg_marquardt.fit(start, training, validation)
-    monkeypatch.setattr(levenberg_marquardt, "BATCH", 1)
+    monkeypatch.setattr(levenberg_marquardt, "BATCH_ROWS", 1)
     alone = levenberg_marquardt.fit(start, training, validation)
     for ours, theirs in zip(network.flatten(together.weights), network.flatten(alone.weights), strict=True):
         assert ours.tobytes() == theirs.tobytes()

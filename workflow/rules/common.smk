@@ -170,7 +170,17 @@ def growing(minutes):
 
 def surrogate_memory():
     """Memory (MB) of a job that fits or asks surrogates: the processes' covariances grow as the square of the plan."""
-    return 1000 + round(4e-5 * len(EXPERIMENTS) ** 2)
+    return 1000 + round(1.4e-4 * len(EXPERIMENTS) ** 2)
+
+
+def training_time(starts, ensembles=0):
+    """Run time (minutes) of a job that trains networks: 5 ms for each network and experiment, and a margin.
+
+    starts: of each network. All sizes are trained, and five times more in the cross-validation; an ensemble
+    has five networks.
+    """
+    networks = starts * (6 * len(STUDY.surrogate.hidden_nodes) + 5 * ensembles)
+    return growing(20 + math.ceil(networks * len(EXPERIMENTS) / (200 * 60)))
 
 
 def simulation_resources():

@@ -115,7 +115,7 @@ rule figure_verification:
         settings=figure("verification"),
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=surrogate_memory(),
         runtime=5,
     shell:
         "python -m hopperopt figure verification --params {params.settings:q} --simulations {input.simulations:q} --surrogate {input.surrogate:q} "

@@ -31,7 +31,7 @@ rule train:
     threads: 1
     resources:
         mem_mb=1500,
-        runtime=30,
+        runtime=training_time(STUDY.surrogate.starts),
     shell:
         "python -m hopperopt train --params {params.settings:q} --training {input.training:q} "
         "--output {output.network:q} {output.errors:q} > {log:q} 2>&1"
@@ -52,7 +52,7 @@ rule validate_fold:
     threads: 1
     resources:
         mem_mb=surrogate_memory(),
-        runtime=10,
+        runtime=training_time(STUDY.surrogate.validation.starts, ensembles=2),
     shell:
         "python -m hopperopt validate_fold --params {params.settings:q} --training {input.training:q} "
         "--output {output.fold:q} > {log:q} 2>&1"

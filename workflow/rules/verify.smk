@@ -36,7 +36,7 @@ rule verify:
         settings=stage("verify"),
     threads: 1
     resources:
-        mem_mb=500,
+        mem_mb=surrogate_memory(),
         runtime=5,
     shell:
         "printf '%s\\n' {input.simulations:q} | "

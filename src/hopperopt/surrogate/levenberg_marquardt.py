@@ -10,7 +10,7 @@ MU_START, MU_GROWTH, MU_DECAY, MU_MAX, MU_MIN = 1e-3, 10.0, 0.1, 1e10, 1e-20
 VALIDATION_FAILURES = 6
 MIN_GRADIENT = 1e-7
 MAX_EPOCHS = 1000
-BATCH = 50  # networks trained together, to bound the memory
+BATCH_ROWS = 20_000  # rows of data of all networks that are trained together, to bound the memory
 
 
 class Fit(NamedTuple):
@@ -45,11 +45,12 @@ def fit(
     start: Weights of n networks; training, validation: Sample. Returns Fit; every network's result depends on
     its own start alone, to the bit.
     """
+    batch = max(1, BATCH_ROWS // training.targets.shape[1])
     parts = [
         _fit_batch(
-            Weights(*(layer[first : first + BATCH] for layer in start)), training, validation, max_epochs
+            Weights(*(layer[first : first + batch] for layer in start)), training, validation, max_epochs
         )
-        for first in range(0, len(start.hidden), BATCH)
+        for first in range(0, len(start.hidden), batch)
     ]
     weights = Weights(
         *(np.concatenate(layers) for layers in zip(*(part.weights for part in parts), strict=True))
