@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # A Slurm cluster of virtual nodes on this machine, the tests of this folder on it, and its end: no daemon is left.
-# Installs slurm-wlm and munge where they are missing: as root, on Debian. NODES: number of nodes, of one CPU each.
+# Installs slurm-wlm and munge where they are missing: as root, on Debian. NODES: number of nodes, of one CPU each,
+# beside one of eight CPUs in a partition of its own.
 # Whatever follows is for pytest, such as -k scancel.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -69,9 +70,10 @@ MinJobAge=3600
 KillWait=5
 SchedulerParameters=batch_sched_delay=1,sched_interval=5
 PartitionName=all Nodes=n[1-$nodes] Default=YES
+PartitionName=wide Nodes=n0
 END
-for n in $(seq "$nodes"); do
-    echo "NodeName=n$n NodeHostname=$host NodeAddr=127.0.0.1 Port=$((7120 + n)) CPUs=1 RealMemory=8000" >> "$configuration"
+for n in $(seq 0 "$nodes"); do
+    echo "NodeName=n$n NodeHostname=$host NodeAddr=127.0.0.1 Port=$((7120 + n)) CPUs=$((n ? 1 : 8)) RealMemory=8000" >> "$configuration"
 done
 
 dd if=/dev/urandom of="$folder/munge.key" bs=128 count=1 status=none
@@ -79,9 +81,9 @@ chmod 400 "$folder/munge.key"
 munged --key-file="$folder/munge.key" --socket="$folder/run/munge.socket" --pid-file="$folder/run/munged.pid" \
     --log-file="$folder/log/munged" --seed-file="$folder/state/munge.seed"
 slurmctld
-for n in $(seq "$nodes"); do slurmd -N "n$n"; done
+for n in $(seq 0 "$nodes"); do slurmd -N "n$n"; done
 for _ in $(seq 60); do
-    [ "$(sinfo --noheader --states=idle --format=%D 2> /dev/null)" = "$nodes" ] && break
+    [ "$(sinfo --noheader --states=idle --format=%D 2> /dev/null)" = $((nodes + 1)) ] && break
     sleep 1
 done
 sinfo

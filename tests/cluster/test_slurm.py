@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.workflow.conftest import CLONE, Study
-from tests.workflow.test_kills import TO_DO, Killed, finish, same_data
+from tests.workflow.test_kills import PATIENCE, TO_DO, Killed, finish, same_data
 from tests.workflow.test_reproducible import data, same
 
 pytestmark = pytest.mark.skipif("CLUSTER" not in os.environ, reason="make test-cluster starts a cluster")
@@ -154,13 +154,31 @@ def test_a_restart_of_the_controller_is_not_noticed(struck, finished):
     struck.check_simulations(finished)
 
 
+def test_one_of_many_simulations_compiles_the_solver_on_a_node_and_the_others_load_it(tmp_path):
+    """In a cache of the node's own, which is empty when eight of them start at once."""
+    (tmp_path / "config.yaml").write_text("filling: {particles: 3}\n")
+    command = (
+        f"XDG_CACHE_HOME=cache/$SLURMD_NODENAME {CLONE}/.venv/bin/python -m hopperopt simulate "
+        "--seed $SLURM_ARRAY_TASK_ID --state-dir state --output runs/$SLURM_ARRAY_TASK_ID.nc"
+    )
+    options = ["--wait", "--partition=wide", "--array=1-16", "--output=log-%a", "--wrap", command]
+    environment = os.environ | {"NUMBA_DEBUG_CACHE": "1"}
+    subprocess.run(["sbatch", *options], cwd=tmp_path, env=environment, check=True)
+    assert len(list(tmp_path.glob("runs/*.nc"))) == 16
+    logs = [path.read_text() for path in tmp_path.glob("log-*")]
+    assert sum("data saved to" in log for log in logs) == 1
+    assert sum("data loaded from" in log and "data saved to" not in log for log in logs) == 15
+    assert [path.name for path in (tmp_path / "cache").iterdir()] == ["n0"]
+
+
 def test_the_reduced_study_in_grouped_jobs_has_the_bits_of_one_machine(tmp_path):
     """The one machine's is the clone's own, finished where it is not."""
     options = ["--configfile", CLONE / "config" / "ci.yaml"]
     local = Study(CLONE).snakemake(*options)
     assert local.returncode == 0, local.stdout
     shutil.copy(CLONE / "config.yaml", tmp_path)
-    finish(OnSlurm(tmp_path).start_snakemake(*options, "--cores=1", profile="slurm-grouped"))
+    on_cluster = OnSlurm(tmp_path).start_snakemake(*options, "--cores=1", profile="slurm-grouped")
+    finish(on_cluster, 4 * PATIENCE)
     one, other = (directory / "results" / "ci" for directory in (CLONE, tmp_path))
     paths = [path for suffix in ("nc", "csv", "yaml", "png") for path in one.rglob(f"*.{suffix}")]
     assert len(paths) > 60

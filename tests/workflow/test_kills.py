@@ -143,9 +143,9 @@ def made(killed):
     return killed
 
 
-def finish(process):
-    """Wait for a process that must end well; return what it said."""
-    output, _ = process.communicate(timeout=PATIENCE)
+def finish(process, patience=PATIENCE):
+    """Wait (s) for a process that must end well; return what it said."""
+    output, _ = process.communicate(timeout=patience)
     assert process.returncode == 0, output
     return output
 
