@@ -145,7 +145,8 @@ REPORTED = [name for name in FIGURES if name not in ("hopper", "curves", "effect
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return the exit status: 0, or 2 for input that cannot be used (said in one sentence)."""
     logging.basicConfig(level=logging.INFO, format="%(levelname)s: %(message)s", stream=sys.stderr)
-    logging.getLogger("matplotlib").setLevel(logging.WARNING)  # it tells of fonts and writers
+    for library in ("matplotlib", "fontTools"):  # they tell of fonts, glyph by glyph, and of writers
+        logging.getLogger(library).setLevel(logging.WARNING)
     try:
         with interruptible():
             given = _parser().parse_args(arguments)

@@ -60,6 +60,12 @@ def test_every_file_says_by_what_it_was_made(finished):
             assert {"git", "host", "versions", "created", "hopperopt_version"} <= set(data.attrs), path
 
 
+def test_libraries_say_nothing_in_the_logs(finished):
+    logs = list((finished.directory / "results" / "logs").rglob("*.log"))
+    assert len(logs) > 30
+    assert [path.name for path in logs if "glyph" in path.read_text().lower()] == []
+
+
 def test_each_run_has_a_seed_of_its_own_and_its_code_digest(finished):
     runs = sorted((finished.directory / "results").glob("*/*_rep_*.nc"))
     attributes = [files.read_netcdf(path).attrs for path in runs]
