@@ -74,8 +74,8 @@ def render(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    shown = multiples.some(study.data)
     environment.policies["json.dumps_kwargs"] = {"ensure_ascii": False, "allow_nan": False}
+    shown = multiples.some(study.data)
     return environment.get_template("page.html").render(
         {
             **sections.opening(study),
