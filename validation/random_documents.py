@@ -231,8 +231,9 @@ def outcome(raw):
                 assert _names_a_key(sentence, raw), sentence
             return "refused", None
         assert all(warning.isprintable() for warning in study.warnings())
-        for stage in config.STAGES:  # the report's hold a case, where a rigid wall has an infinite modulus
-            json.dumps(study.stage_params(stage), allow_nan=stage == "report")
+        for params in map(study.stage_params, config.STAGES):
+            # Some hold a case, where a rigid wall has an infinite modulus.
+            json.dumps(params, allow_nan="derived" in params)
         json.dumps(study.derived_params("selected", 1))
         small = _small(study)
         ended = "accepted" if small.time_step < FINEST_STEP else _run(small, Path(folder))

@@ -58,11 +58,13 @@ def test_what_reruns_rounds(study):
         {"verification": {"replicates": 2}, "figures": {"dpi": 60}},
     ):
         assert planned(study, *with_infill(study, 2, **change))[0] == {}, change
+    wider = yaml.safe_load((study.clone / "config.yaml").read_text())["factors"]
+    wider["height_mm"]["levels"][-1] = 25
     for change in (
         {"optimise": {"population": 10}},
         {"surrogate": {"seed": 2}},
         {"infill": {"rounds": 2, "batch": 1}},
-        {"factors": {"height_mm": {"levels": [34, 32, 29.6, 28, 25]}}},
+        {"factors": wider},
     ):
         rounds, others = planned(study, *with_infill(study, 2, **change))
         assert len(rounds["propose"]) == 2 and "simulate" not in others, change
