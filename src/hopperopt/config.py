@@ -366,7 +366,12 @@ class Setup(Model):
 
     def with_values(self, values):
         """The same with other values at dotted keys that exist; ConfigError when one is not allowed."""
-        document = self.document
+        # The sections as they are, which need no second reading; those with other values as plain dicts.
+        changed = {key.partition(".")[0] for key in values}
+        document = {
+            name: self.document[name] if name in changed else getattr(self, name)
+            for name in type(self).model_fields
+        }
         for key, value in values.items():
             document = replaced(document, key, value)
         try:
