@@ -1,7 +1,9 @@
-"""The solver's compiled code lives in a cache of its own, which has to be named before numba is imported."""
+"""What has to be set before numpy and numba are imported: threads, and the compiled solver's own cache."""
 
 import json
 import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in Snakemake's jobs: tests run beside each other
 
 import numpy as np
 import pandas as pd

@@ -1,5 +1,6 @@
 """The plan's table, its runs gathered in one dataset, and which runs may be data points at all."""
 
+import itertools
 import json
 import logging
 import os
@@ -160,18 +161,18 @@ def assemble(plan: pd.DataFrame, runs: Mapping, unusable: Mapping) -> xr.Dataset
         raise files.InputError(f"no run of {', '.join(missing)}")
     first = next(iter(runs))
     target = common_target({first: runs[first]})
-    rows = []
-    for experiment in plan.index:
-        row = []
-        for replicate in replicates:
-            key = experiment, replicate
-            run = runs[key]
-            common_target({key: run}, (first, target))
-            row.append(_data_point(run, target, key in unusable))
-        rows.append(xr.concat(row, "replicate", coords="minimal", compat="override", join="exact"))
-    dataset = xr.concat(rows, "experiment", coords="minimal", compat="override", join="exact")
-    dataset = dataset.assign_coords(_coordinates(plan, replicates, target))
-    dataset = dataset.assign_attrs(factors=" ".join(plan.columns))
+    points = []
+    for key in itertools.product(plan.index, replicates):
+        run = runs[key]
+        common_target({key: run}, (first, target))
+        points.append(_data_point(run, target, key in unusable))
+    variables = {}
+    for name, first_point in points[0].items():
+        values = np.stack([point[name].values for point in points])
+        values = values.reshape(len(plan), len(replicates), *first_point.shape)
+        variables[name] = ("experiment", "replicate", *first_point.dims), values, first_point.attrs
+    attributes = {"factors": " ".join(plan.columns)}
+    dataset = xr.Dataset(variables, _coordinates(plan, replicates, target), attributes)
     return _described(dataset.assign(_of_designs(dataset)), unusable)
 
 
@@ -191,27 +192,26 @@ def common_target(runs: Mapping, known: tuple | None = None) -> np.ndarray:
     return target
 
 
-def _data_point(run: xr.Dataset, target: np.ndarray, unusable: bool) -> xr.Dataset:
-    """Everything that the dataset holds of one run."""
-    scalars = run[[name for name, variable in run.data_vars.items() if variable.ndim == 0]].reset_coords(
-        drop=True
-    )
-    scalars.attrs = {}
+def _data_point(run: xr.Dataset, target: np.ndarray, unusable: bool) -> dict[str, xr.Variable]:
+    """Everything that the dataset holds of one run, by name."""
+    point = {name: values.variable for name, values in run.data_vars.items() if values.ndim == 0}
     composition = outflow.outflow(run["exit_time"].values, run["diameter"].values, run["size_class"].values)
     order = indices.residence_order(run["exit_time"].values, run["position_opening"].values)
     fraction, variance = composition if not unusable else np.full_like(composition, np.nan)
-    scalars[indices.ORDER] = order
+    point[indices.ORDER] = xr.Variable((), order)
     if unusable:
-        scalars = scalars.assign({name: scalars[name].where(False) for name in (*RESULTS, indices.ORDER)})
-    of_sizes = indices.of_outflow(fraction, variance, target)
-    by_size: dict = {name: ("size_class", values) for name, values in of_sizes.items()}
-    return scalars.assign(
-        mass_fraction=(("size_class", "M"), fraction),
-        counting_variance=(("size_class", "M"), variance),
-        J=("size_class", outflow.objective(fraction, target)),
-        U=("size_class", outflow.corrected_square(fraction, target, variance)),
-        **by_size,
-    )
+        point |= {name: point[name].copy(data=np.array(np.nan)) for name in (*RESULTS, indices.ORDER)}
+    by_size = {
+        "J": outflow.objective(fraction, target),
+        "U": outflow.corrected_square(fraction, target, variance),
+        **indices.of_outflow(fraction, variance, target),
+    }
+    return {
+        **point,
+        "mass_fraction": xr.Variable(("size_class", "M"), fraction),
+        "counting_variance": xr.Variable(("size_class", "M"), variance),
+        **{name: xr.Variable("size_class", values) for name, values in by_size.items()},
+    }
 
 
 def _of_designs(dataset: xr.Dataset) -> dict:

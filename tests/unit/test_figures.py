@@ -194,7 +194,7 @@ def check_texts(figure):
     [
         {},
         {"experiments": 1, "count": 100},
-        {"factors": 4},
+        {"experiments": 10, "factors": 4},
         {"experiments": 7, "replicates": 2, "factors": 6},
         {"experiments": 12, "dropped": [("exp_04", 1)]},
         {"experiments": 5, "name": "long_name_{}"},
@@ -210,7 +210,10 @@ def test_curves_can_be_read_for_any_number_of_experiments(make_plan, plan):
 def test_factors_stand_in_the_studys_order(make_plan, make_training, tmp_path):
     """A netCDF file gives its coordinates back in another one."""
     files.write_netcdf(make_plan(5), tmp_path / "plan.nc")
-    for figure in (curves.draw(files.read_netcdf(tmp_path / "plan.nc")), fit.draw(*make_training())):
+    for figure in (
+        curves.draw(files.read_netcdf(tmp_path / "plan.nc")),
+        fit.draw(*make_training(experiments=10)),
+    ):
         assert "$\\theta$ (°),  $L$ (mm),  $H$ (mm)" in [text.get_text() for text, _ in written(figure)]
 
 
@@ -229,8 +232,9 @@ def test_a_page_of_panels_shows_some_of_many_experiments(make_training, tmp_path
     assert len(drawn) == 2
 
 
-@pytest.mark.parametrize("split", ["experiments", "points"])
-@pytest.mark.parametrize("plan", [{}, {"experiments": 10, "factors": 1, "count": 100}])
+@pytest.mark.parametrize(
+    ("split", "plan"), [("experiments", {}), ("points", {"experiments": 10, "factors": 1, "count": 100})]
+)
 def test_fit_can_be_read_and_tells_what_did_not_train(make_training, split, plan):
     training, predicted = make_training(split, **plan)
     figure = fit.draw(training, predicted)
