@@ -74,7 +74,9 @@ def _fit_batch(start, training, validation, max_epochs):
     """`fit` for networks that are stepped together; those that have finished leave the batch."""
     count, hidden_nodes, width = start.hidden.shape
     shape = hidden_nodes, width - 1, start.output.shape[1]
-    error, matrix, gradient = _linearise(start, training)
+    activations, residuals = _evaluate(start, training)
+    error = _mean_square(residuals)
+    matrix, gradient = _linearise(start, training, activations, residuals)
     best = Fit(flatten(start), np.zeros(count, dtype=int), error.copy(), _monitor(start, error, validation))
     state = _State(
         np.arange(count),
@@ -104,13 +106,18 @@ def _step(state, best, shape, training, validation):
     """Try one step of every network in `state`; changes `state` and `best` in place."""
     trial = state.vector - _damped_solution(state.matrix, state.mu, state.gradient)
     trial_weights = unflatten(trial, *shape)
-    lower = _error(trial_weights, training) < state.error
+    activations, residuals = _evaluate(trial_weights, training)
+    error = _mean_square(residuals)
+    lower = error < state.error
     state.mu[:] = np.where(lower, np.maximum(state.mu * MU_DECAY, MU_MIN), state.mu * MU_GROWTH)
     if not lower.any():
         return
     accepted = Weights(*(layer[lower] for layer in trial_weights))
     state.vector[lower] = trial[lower]
-    state.error[lower], state.matrix[lower], state.gradient[lower] = _linearise(accepted, training)
+    state.error[lower] = error[lower]
+    state.matrix[lower], state.gradient[lower] = _linearise(
+        accepted, training, activations[lower], residuals[lower]
+    )
 
     index = state.index[lower]
     best.epochs[index] += 1
@@ -123,25 +130,26 @@ def _step(state, best, shape, training, validation):
     best.validation_error[index] = monitored[progress]
 
 
-def _error(weights, sample):
+def _evaluate(weights, sample):
+    """Activations and residuals of n networks."""
+    activations, outputs = forward(weights, sample.inputs)
+    return activations, outputs - sample.targets
+
+
+def _mean_square(residuals):
     """Mean squared residual (n,) of n networks."""
-    residuals = forward(weights, sample.inputs)[1] - sample.targets
     return np.mean((residuals**2).reshape(len(residuals), -1), axis=1)
 
 
 def _monitor(weights, training_error, validation):
     """Error that decides on stopping: on the validation data where there are any, else the training error."""
-    return training_error.copy() if validation is None else _error(weights, validation)
+    return training_error.copy() if validation is None else _mean_square(_evaluate(weights, validation)[1])
 
 
-def _linearise(weights, training):
-    """Mean squared residual, J'J and J'e over the number of residuals, of n networks."""
-    activations, outputs = forward(weights, training.inputs)
-    residuals = outputs - training.targets
+def _linearise(weights, training, activations, residuals):
+    """J'J and J'e over the number of residuals, of n networks."""
     matrix, gradient = normal_equations(weights, training.inputs, activations, residuals)
-    number = training.targets.size
-    error = np.mean((residuals**2).reshape(len(residuals), -1), axis=1)
-    return error, matrix / number, gradient / number
+    return matrix / training.targets.size, gradient / training.targets.size
 
 
 def _damped_solution(matrix, mu, gradient):

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import expit
 from threadpoolctl import threadpool_limits
 
 from hopperopt.surrogate import features
@@ -127,11 +128,11 @@ def forward(weights: Weights, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarra
     Returns the layer's activations with a last row of ones, (n, hidden + 1, rows), and the outputs (n,
     outputs, rows).
     """
-    argument = weights.hidden @ inputs
-    count, hidden_nodes, data_rows = argument.shape
-    activations = np.ones((count, hidden_nodes + 1, data_rows))
-    # 1 / (1 + exp(-x)) = (1 + tanh(x / 2)) / 2, which cannot overflow.
-    activations[:, :-1] = 0.5 + 0.5 * np.tanh(0.5 * argument)
+    count, hidden_nodes, _ = weights.hidden.shape
+    activations = np.empty((count, hidden_nodes + 1, inputs.shape[1]))
+    hidden = np.matmul(weights.hidden, inputs, out=activations[:, :-1])
+    expit(hidden, out=hidden)
+    activations[:, -1] = 1.0
     return activations, weights.output @ activations
 
 
