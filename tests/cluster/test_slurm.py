@@ -154,6 +154,39 @@ def test_a_restart_of_the_controller_is_not_noticed(struck, finished):
     struck.check_simulations(finished)
 
 
+def test_a_simulation_has_the_threads_of_its_allocation(struck, finished):
+    options = ["--set-threads", "simulate=2", "--default-resources", "slurm_partition=wide"]
+    snakemake = struck.start_snakemake(*struck.targets, *options)
+    for process in struck.wait_until_held():
+        arguments = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
+        assert arguments[arguments.index(b"--threads") + 1] == b"2"
+        job = struck.environment_of(process)["SLURM_JOB_ID"]
+        assert slurm("squeue", "--noheader", "--jobs", job, "--format=%C").strip() == "2"
+    struck.hold.unlink()
+    finish(snakemake)
+    struck.check_simulations(finished)
+
+
+def test_a_failed_simulation_takes_its_job_along(struck, finished):
+    """Of two in a job the first ends well and the second is killed: the first is made anew, from nothing."""
+    snakemake = struck.start_snakemake(*struck.targets, profile="slurm-grouped")
+    struck.wait(lambda: list(struck.directory.glob("held-*")))
+    (first,) = (run for run in TO_DO if list(struck.directory.glob(f"held-{run}-*")))
+    (second,) = set(TO_DO) - {first}
+    (process,) = struck.wait_until_held([first])
+    struck.hold.unlink()
+    struck.wait(lambda: ended(process))
+    struck.hold.touch()
+    (process,) = struck.wait_until_held([second])
+    os.kill(process, signal.SIGKILL)
+    struck.wait(lambda: ended(process))
+    struck.hold.unlink()
+    said = finish(snakemake)
+    assert f"results/simulations/{first}.nc" in said.partition("since they might be corrupted:")[2]
+    assert resumed(struck) == [second]
+    struck.check_simulations(finished)
+
+
 def test_one_of_many_simulations_compiles_the_solver_on_a_node_and_the_others_load_it(tmp_path):
     """In a cache of the node's own, which is empty when eight of them start at once."""
     (tmp_path / "config.yaml").write_text("filling: {particles: 3}\n")
@@ -177,7 +210,7 @@ def test_the_reduced_study_in_grouped_jobs_has_the_bits_of_one_machine(tmp_path)
     local = Study(CLONE).snakemake(*options)
     assert local.returncode == 0, local.stdout
     shutil.copy(CLONE / "config.yaml", tmp_path)
-    on_cluster = OnSlurm(tmp_path).start_snakemake(*options, "--cores=1", profile="slurm-grouped")
+    on_cluster = OnSlurm(tmp_path).start_snakemake(*options, profile="slurm-grouped")
     finish(on_cluster, 4 * PATIENCE)
     one, other = (directory / "results" / "ci" for directory in (CLONE, tmp_path))
     paths = [path for suffix in ("nc", "csv", "yaml", "png") for path in one.rglob(f"*.{suffix}")]
