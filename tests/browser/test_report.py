@@ -61,12 +61,16 @@ def text_of(browser, selector):
 
 
 def move_to(browser, selector):
-    """Point at the middle of an element as drawn."""
+    """Point at the middle of an element as drawn, and wait until a busy browser has taken notice."""
     from selenium.webdriver import ActionChains
+    from selenium.webdriver.support.wait import WebDriverWait
 
     element = browser.find_element("css selector", selector)
     browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
-    ActionChains(browser).move_to_element(element).perform()
+    ActionChains(browser).move_to_element(element).move_by_offset(1, 0).perform()
+    below = "return arguments[0].matches(':hover')"
+    WebDriverWait(browser, 30).until(lambda _: browser.execute_script(below, element))
+    browser.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
 
 
 @pytest.mark.parametrize("width", WIDTHS)
