@@ -4,7 +4,7 @@
 # make report              the study on one page, results/report.html, and what it needs; make writes it as well
 # make setup               the environment alone; make cluster: and Snakemake's plugin for Slurm
 # make test, make lint     in the same environment: the tests; style and the boundaries between modules
-# make test-all            the tests with the full counts: hours
+# make test-all            the tests with the full counts: an hour
 # make test-browser        both reports in Debian's Chromium; skipped where that is missing
 # make test-cluster        the study on a Slurm cluster of virtual nodes: as root on Debian, an hour
 # make validation         the solver against closed forms and other codes: rewrites docs/validation.md; CASE=name for one
