@@ -195,6 +195,7 @@ def check_texts(figure):
         {},
         {"experiments": 1, "count": 100},
         {"experiments": 10, "factors": 4},
+        pytest.param({"factors": 4}, marks=pytest.mark.full),
         {"experiments": 7, "replicates": 2, "factors": 6},
         {"experiments": 12, "dropped": [("exp_04", 1)]},
         {"experiments": 5, "name": "long_name_{}"},
@@ -232,8 +233,17 @@ def test_a_page_of_panels_shows_some_of_many_experiments(make_training, tmp_path
     assert len(drawn) == 2
 
 
+SMALL_PLAN = {"experiments": 10, "factors": 1, "count": 100}
+
+
 @pytest.mark.parametrize(
-    ("split", "plan"), [("experiments", {}), ("points", {"experiments": 10, "factors": 1, "count": 100})]
+    ("split", "plan"),
+    [
+        ("experiments", {}),
+        ("points", SMALL_PLAN),
+        pytest.param("points", {}, marks=pytest.mark.full),
+        pytest.param("experiments", SMALL_PLAN, marks=pytest.mark.full),
+    ],
 )
 def test_fit_can_be_read_and_tells_what_did_not_train(make_training, split, plan):
     training, predicted = make_training(split, **plan)
