@@ -94,6 +94,18 @@ def test_networks_do_not_depend_on_their_batch(monkeypatch):
     np.testing.assert_array_equal(together.validation_error, alone.validation_error)
 
 
+def test_data_in_parts_train_the_same_networks(monkeypatch):
+    """Sums of many rows are those of their parts; the last bits of a sum are not the same."""
+    training, validation = sample(60, seed=3), sample(30, seed=4)
+    start = network.initial_weights(4, INPUTS, OUTPUTS, seeds(6))
+    whole = levenberg_marquardt.fit(start, training, validation, max_epochs=20)
+    monkeypatch.setattr(levenberg_marquardt, "PART_ROWS", 25)
+    parts = levenberg_marquardt.fit(start, training, validation, max_epochs=20)
+    np.testing.assert_array_equal(parts.epochs, whole.epochs)
+    np.testing.assert_allclose(parts.training_error, whole.training_error, rtol=1e-6)
+    np.testing.assert_allclose(parts.validation_error, whole.validation_error, rtol=1e-6)
+
+
 def test_cores_change_no_bit_of_many_predictions():
     """BLAS shares a product among the cores where it is large enough, and ends it differently."""
     weights = network.initial_weights(7, INPUTS, OUTPUTS, seeds(1))

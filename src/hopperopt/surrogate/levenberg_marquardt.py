@@ -11,6 +11,7 @@ VALIDATION_FAILURES = 6
 MIN_GRADIENT = 1e-7
 MAX_EPOCHS = 1000
 BATCH_ROWS = 20_000  # rows of data of all networks that are trained together, to bound the memory
+PART_ROWS = 4_000  # rows of data that are worked on at a time, so that they stay in the cache
 
 
 class Fit(NamedTuple):
@@ -46,16 +47,28 @@ def fit(
     its own start alone, to the bit.
     """
     batch = max(1, BATCH_ROWS // training.targets.shape[1])
-    parts = [
+    training_parts, validation_parts = _parts(training), validation and _parts(validation)
+    fits = [
         _fit_batch(
-            Weights(*(layer[first : first + batch] for layer in start)), training, validation, max_epochs
+            Weights(*(layer[first : first + batch] for layer in start)),
+            training_parts,
+            validation_parts,
+            max_epochs,
         )
         for first in range(0, len(start.hidden), batch)
     ]
     weights = Weights(
-        *(np.concatenate(layers) for layers in zip(*(part.weights for part in parts), strict=True))
+        *(np.concatenate(layers) for layers in zip(*(one.weights for one in fits), strict=True))
     )
-    return Fit(weights, *(np.concatenate([part[item] for part in parts]) for item in (1, 2, 3)))
+    return Fit(weights, *(np.concatenate([one[item] for one in fits]) for item in (1, 2, 3)))
+
+
+def _parts(sample):
+    """A sample in parts of a few thousand rows."""
+    return [
+        Sample(*(np.ascontiguousarray(of_all[:, first : first + PART_ROWS]) for of_all in sample))
+        for first in range(0, sample.targets.shape[1], PART_ROWS)
+    ]
 
 
 class _State(NamedTuple):
@@ -71,12 +84,15 @@ class _State(NamedTuple):
 
 
 def _fit_batch(start, training, validation, max_epochs):
-    """`fit` for networks that are stepped together; those that have finished leave the batch."""
+    """`fit` for networks that are stepped together; those that have finished leave the batch.
+
+    training, validation: samples in parts.
+    """
     count, hidden_nodes, width = start.hidden.shape
     shape = hidden_nodes, width - 1, start.output.shape[1]
-    activations, residuals = _evaluate(start, training)
-    error = _mean_square(residuals)
-    matrix, gradient = _linearise(start, training, activations, residuals)
+    evaluated = _evaluate(start, training)
+    error = _mean_square(evaluated)
+    matrix, gradient = _linearise(start, training, evaluated)
     best = Fit(flatten(start), np.zeros(count, dtype=int), error.copy(), _monitor(start, error, validation))
     state = _State(
         np.arange(count),
@@ -106,8 +122,8 @@ def _step(state, best, shape, training, validation):
     """Try one step of every network in `state`; changes `state` and `best` in place."""
     trial = state.vector - _damped_solution(state.matrix, state.mu, state.gradient)
     trial_weights = unflatten(trial, *shape)
-    activations, residuals = _evaluate(trial_weights, training)
-    error = _mean_square(residuals)
+    evaluated = _evaluate(trial_weights, training)
+    error = _mean_square(evaluated)
     lower = error < state.error
     state.mu[:] = np.where(lower, np.maximum(state.mu * MU_DECAY, MU_MIN), state.mu * MU_GROWTH)
     if not lower.any():
@@ -115,9 +131,8 @@ def _step(state, best, shape, training, validation):
     accepted = Weights(*(layer[lower] for layer in trial_weights))
     state.vector[lower] = trial[lower]
     state.error[lower] = error[lower]
-    state.matrix[lower], state.gradient[lower] = _linearise(
-        accepted, training, activations[lower], residuals[lower]
-    )
+    evaluated = [(activations[lower], residuals[lower]) for activations, residuals in evaluated]
+    state.matrix[lower], state.gradient[lower] = _linearise(accepted, training, evaluated)
 
     index = state.index[lower]
     best.epochs[index] += 1
@@ -130,26 +145,34 @@ def _step(state, best, shape, training, validation):
     best.validation_error[index] = monitored[progress]
 
 
-def _evaluate(weights, sample):
-    """Activations and residuals of n networks."""
-    activations, outputs = forward(weights, sample.inputs)
-    return activations, outputs - sample.targets
+def _evaluate(weights, parts):
+    """Activations and residuals of n networks for each part of a sample."""
+    evaluated = []
+    for part in parts:
+        activations, outputs = forward(weights, part.inputs)
+        evaluated.append((activations, outputs - part.targets))
+    return evaluated
 
 
-def _mean_square(residuals):
+def _mean_square(evaluated):
     """Mean squared residual (n,) of n networks."""
-    return np.mean((residuals**2).reshape(len(residuals), -1), axis=1)
+    squares = [(residuals**2).reshape(len(residuals), -1) for _, residuals in evaluated]
+    return sum(part.sum(axis=1) for part in squares) / sum(part.shape[1] for part in squares)
 
 
 def _monitor(weights, training_error, validation):
     """Error that decides on stopping: on the validation data where there are any, else the training error."""
-    return training_error.copy() if validation is None else _mean_square(_evaluate(weights, validation)[1])
+    return training_error.copy() if validation is None else _mean_square(_evaluate(weights, validation))
 
 
-def _linearise(weights, training, activations, residuals):
+def _linearise(weights, parts, evaluated):
     """J'J and J'e over the number of residuals, of n networks."""
-    matrix, gradient = normal_equations(weights, training.inputs, activations, residuals)
-    return matrix / training.targets.size, gradient / training.targets.size
+    size = sum(part.targets.size for part in parts)
+    matrix = gradient = 0.0
+    for part, (activations, residuals) in zip(parts, evaluated, strict=True):
+        of_part = normal_equations(weights, part.inputs, activations, residuals)
+        matrix, gradient = matrix + of_part[0], gradient + of_part[1]
+    return matrix / size, gradient / size
 
 
 def _damped_solution(matrix, mu, gradient):
