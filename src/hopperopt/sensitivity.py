@@ -7,20 +7,17 @@ spread tells how well they are known.
 """
 
 import os
-import warnings
 from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 from scipy.stats import qmc, sobol_indices
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
 from hopperopt import files
 from hopperopt.outflow import objective
-from hopperopt.surrogate import gaussian, prediction
+from hopperopt.surrogate import gaussian, prediction, process
 from hopperopt.surrogate.features import OUTPUTS
 from hopperopt.surrogate.network import one_thread
 
@@ -95,13 +92,10 @@ def draw_times(
     mean, scale = times[usable].mean(), times[usable].std() or 1.0
     scores = (times[usable] - mean) / scale
     kernel = ConstantKernel() * Matern(np.ones(len(factors)), gaussian.LENGTHS, nu=2.5) + WhiteKernel(0.1)
-    with warnings.catch_warnings():
-        # A factor without effect takes its length to the bound, as it should.
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        some = gaussian.searched(len(scores))
-        fitted = GaussianProcessRegressor(kernel, random_state=0).fit(trained[some], scores[some]).kernel_
-    process = GaussianProcessRegressor(fitted.k1, alpha=fitted.k2.noise_level, optimizer=None)
-    curve, covariance = process.fit(trained, scores).predict((designs - centre) / half, return_cov=True)
+    fitted = process.likeliest(kernel, trained, scores)
+    noise = np.full(len(scores), fitted.k2.noise_level)
+    known = process.conditioned(fitted.k1, trained, scores, noise)
+    curve, covariance = known.predict((designs - centre) / half, return_cov=True)
     return mean + scale * rng.multivariate_normal(curve, covariance, DRAWS, method="eigh")
 
 

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 import xarray as xr
+from sklearn.gaussian_process import GaussianProcessRegressor
 
 from hopperopt import files, outflow, sensitivity
-from hopperopt.surrogate import gaussian, prediction
+from hopperopt.surrogate import gaussian, prediction, process
 from hopperopt.surrogate.network import Ensemble, Network, Scaling
 
 COLUMNS = [
@@ -107,14 +108,14 @@ def test_a_single_network_has_indices_without_intervals(run):
 def test_many_experiments_take_part_and_some_are_searched(synthetic, monkeypatch):
     """The search for a process' hyperparameters takes the cube of their number at each of its steps."""
     seen = []
-    fit = sensitivity.GaussianProcessRegressor.fit
+    fit = GaussianProcessRegressor.fit
 
     def spy(self, inputs, scores):
         seen.append((self.optimizer is not None, len(inputs)))
         return fit(self, inputs, scores)
 
-    monkeypatch.setattr(sensitivity.GaussianProcessRegressor, "fit", spy)
-    monkeypatch.setattr(gaussian, "SEARCHED", 13)
+    monkeypatch.setattr(GaussianProcessRegressor, "fit", spy)
+    monkeypatch.setattr(process, "SEARCHED", 13)
     data = xr.Dataset(
         {"discharge_time": (("experiment", "replicate"), 1.3 - 0.01 * synthetic.designs[:, 1:2])},
         coords={name: ("experiment", synthetic.designs[:, k]) for k, name in enumerate(synthetic.factors)},

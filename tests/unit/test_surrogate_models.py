@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from hopperopt import files
 from hopperopt.outflow import GRID, objective
-from hopperopt.surrogate import ensemble, gaussian, prediction
+from hopperopt.surrogate import ensemble, gaussian, prediction, process
 
 NETWORKS = {"hidden_nodes": 3, "starts": 3, "seed": 1}
 
@@ -44,7 +45,7 @@ def test_the_processes_find_the_curves_behind_the_noise(synthetic):
 def test_some_of_many_experiments_find_the_hyperparameters_and_all_predict(synthetic, monkeypatch):
     data, designs = synthetic.training(3), synthetic.anywhere(50, np.random.default_rng(0))
     whole = gaussian.fit(data)
-    monkeypatch.setattr(gaussian, "SEARCHED", 13)
+    monkeypatch.setattr(process, "SEARCHED", 13)
     part = gaussian.fit(data)
     assert len(part.designs) == 25 and not np.array_equal(part.lengths, whole.lengths)
     difference = part.moments(designs, GRID)[0] - whole.moments(designs, GRID)[0]
@@ -62,6 +63,40 @@ def test_the_processes_are_conditioned_once(synthetic, monkeypatch):
         model.moments(synthetic.designs, GRID)
     model.draws(synthetic.designs, GRID, 2, np.random.default_rng(0))
     assert len(fitted) == len(model.components)
+
+
+def test_many_values_condition_a_process_by_inducing_inputs(monkeypatch):
+    """Held against the process that all values condition, and one that a part of them does."""
+    rng = np.random.default_rng(3)
+    inputs, elsewhere = rng.uniform(-1, 1, (600, 3)), rng.uniform(-1, 1, (200, 3))
+    kernel = ConstantKernel(30.0) * Matern([1.0, 2.0, 40.0], nu=2.5)
+    truth = rng.multivariate_normal(np.zeros(600), kernel(inputs), method="eigh")
+    noise = 1 / rng.integers(1, 6, 600)
+    values = truth + np.sqrt(noise) * rng.normal(size=600)
+    exact = GaussianProcessRegressor(kernel, alpha=noise, optimizer=None).fit(inputs, values)
+    mean, deviation = exact.predict(elsewhere, return_std=True)
+
+    def compared(model):
+        found, spread = model.predict(elsewhere, return_std=True)
+        return np.sqrt(np.mean(((found - mean) / deviation) ** 2)), np.abs(spread / deviation - 1).max()
+
+    monkeypatch.setattr(process, "EXACT", 150)
+    many = process.conditioned(kernel, inputs, values, noise)
+    missed, wrong = compared(many)
+    assert missed < 0.1 and wrong < 0.05
+    part = slice(150)
+    assert compared(process.conditioned(kernel, inputs[part], values[part], noise[part]))[0] > 5 * missed
+    covariance = exact.predict(elsewhere, return_cov=True)[1]
+    np.testing.assert_allclose(
+        many.predict(elsewhere, return_cov=True)[1], covariance, atol=0.1 * deviation.max() ** 2
+    )
+    np.testing.assert_array_equal(many.predict(elsewhere), many.predict(elsewhere, return_std=True)[0])
+    # With all of them as inducing inputs it is the exact one; inputs that are there twice do no harm.
+    monkeypatch.setattr(process, "EXACT", 700)
+    missed, wrong = compared(process.Inducing(kernel, inputs, values, noise))
+    assert missed < 1e-4 and wrong < 1e-4
+    twice = process.Inducing(kernel, *(np.repeat(part, 2, axis=0) for part in (inputs, values, 2 * noise)))
+    assert len(twice.inputs) == 600 and compared(twice)[0] < 1e-4
 
 
 def test_without_an_effect_the_processes_predict_one_curve(synthetic):

@@ -11,12 +11,12 @@ besides has a variance of its own, the same at every design.
 """
 
 import functools
-import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
 
+from hopperopt.surrogate import process
 from hopperopt.surrogate.network import one_thread, range_scaling
 
 LENGTHS = (
@@ -24,8 +24,7 @@ LENGTHS = (
     50.0,
 )  # bounds of the correlation lengths, in half ranges; the longest is a factor without effect
 VARIANCES = (1e-4, 1e8)  # bounds of a process' variance, in variances of the noise
-SEARCHED = 500  # experiments at most in that search, whose time grows with their cube
-RESTARTS = 1  # of the search for them, with seeds of their own
+RESTARTS = 1  # of the search for a process' variance and lengths, with seeds of their own
 LEAST_NOISE = 1e-4  # standard deviation of a mass fraction that counts as none
 
 
@@ -49,7 +48,7 @@ class Gaussian:
     def moments(self, designs: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and variance, (n, outputs, m) each, of the curves without noise, at the M of the training."""
         inputs = self._scaled(designs)
-        known = [process.predict(inputs, return_std=True) for process in self._processes]
+        known = [one.predict(inputs, return_std=True) for one in self._processes]
         scores, deviations = (np.stack(part, axis=-1) for part in zip(*known, strict=True))
         own = np.einsum("nc,com->nom", deviations**2, self.components**2)
         shared = self.mean_variance + np.einsum(
@@ -63,8 +62,8 @@ class Gaussian:
         """Draw curves without noise, joint over the designs: (number, n, outputs, m)."""
         inputs = self._scaled(designs)
         scores = []
-        for process in self._processes:
-            mean, covariance = process.predict(inputs, return_cov=True)
+        for one in self._processes:
+            mean, covariance = one.predict(inputs, return_cov=True)
             scores.append(rng.multivariate_normal(mean, covariance, number, method="eigh"))
 
         def normal(count, variance):
@@ -78,7 +77,7 @@ class Gaussian:
     @one_thread
     def believing(self, design: np.ndarray, runs: int) -> "Gaussian":
         """The processes as if so many runs of a design (factors,) had shown what is predicted there."""
-        scores = [process.predict(self._scaled(design)) for process in self._processes]
+        scores = [one.predict(self._scaled(design)) for one in self._processes]
         designs = np.vstack([self.designs, design])
         widths = range_scaling(self.designs).scale / range_scaling(designs).scale
         return replace(
@@ -94,10 +93,10 @@ class Gaussian:
 
     @functools.cached_property
     def _processes(self):
-        """A process per component, conditioned on the training scores: once, as that takes n^3."""
+        """A process per component, conditioned on the training scores: once, as that takes long with many."""
         inputs = self._scaled(self.designs)
         return [
-            _process(variance, lengths, self.noise, optimizer=None).fit(inputs, scores)
+            process.conditioned(_kernel(variance, lengths), inputs, scores, self.noise)
             for scores, variance, lengths in zip(self.scores.T, self.variances, self.lengths, strict=True)
         ]
 
@@ -108,7 +107,7 @@ def fit(data: xr.Dataset) -> Gaussian:
 
     data: `target`, `variance` (of the mean curve), `runs`, `target_fraction` and the factors, as the stage
     `filter` writes them. The variance of one run is pooled over the experiments. The hyperparameters are
-    those of the largest likelihood; of more than 500 experiments, every so many of them have a say in that.
+    those of the largest likelihood (see `process`).
     """
     designs = np.column_stack([data[name].values for name in data.attrs["factors"].split()])
     curves, batch = (
@@ -119,8 +118,7 @@ def fit(data: xr.Dataset) -> Gaussian:
     departures = ((curves - mean) / scale).reshape(len(curves), -1)
     directions, rest = _components(departures, noise.mean())
     scores, inputs = departures @ directions.T, range_scaling(designs).normalise(designs)
-    some = searched(len(curves))
-    found = [_hyperparameters(inputs[some], score[some], noise[some]) for score in scores.T]
+    found = [_hyperparameters(inputs, score, noise) for score in scores.T]
     variances, lengths = (np.array(part) for part in zip(*found, strict=True))
     from_batch, mean_variance = _shrunk(mean - batch[:, None], scale, noise.mean() / len(curves))
     error = noise.mean() / np.sum(scores**2, axis=0)[:, None, None]
@@ -129,11 +127,6 @@ def fit(data: xr.Dataset) -> Gaussian:
         designs, noise, scale, batch[:, None] + from_batch, mean_variance, components, component_variances,
         rest, scores, variances, lengths,
     )  # fmt: skip
-
-
-def searched(experiments: int) -> slice:
-    """Those of so many experiments with which hyperparameters are searched."""
-    return slice(None, None, -(-experiments // SEARCHED))
 
 
 def _shrunk(curves, scale, variance):
@@ -169,23 +162,15 @@ def _components(curves, noise):
     return directions[:count], np.maximum(rest, 0.0)
 
 
-def _process(variance, lengths, noise, **search):
-    """A process that knows the noise in its scores; `search` are scikit-learn's options."""
-    from sklearn.gaussian_process import GaussianProcessRegressor, kernels  # slow to import
+def _kernel(variance, lengths):
+    from sklearn.gaussian_process import kernels  # slow to import
 
-    kernel = kernels.ConstantKernel(variance, VARIANCES) * kernels.Matern(lengths, LENGTHS, nu=2.5)
-    return GaussianProcessRegressor(kernel, alpha=noise, **search)
+    return kernels.ConstantKernel(variance, VARIANCES) * kernels.Matern(lengths, LENGTHS, nu=2.5)
 
 
 def _hyperparameters(inputs, scores, noise):
     """Variance and correlation lengths of a process: those that make its scores likeliest."""
-    from sklearn.exceptions import ConvergenceWarning
-
     factors = inputs.shape[1]
-    start = float(np.clip(np.var(scores), *VARIANCES))
-    process = _process(start, np.ones(factors), noise, n_restarts_optimizer=RESTARTS, random_state=0)
-    with warnings.catch_warnings():
-        # A factor without effect takes its length to the bound, as it should.
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        best = process.fit(inputs, scores).kernel_
+    start = _kernel(float(np.clip(np.var(scores), *VARIANCES)), np.ones(factors))
+    best = process.likeliest(start, inputs, scores, noise, RESTARTS)
     return best.k1.constant_value, np.broadcast_to(best.k2.length_scale, factors)
