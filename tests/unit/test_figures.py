@@ -388,6 +388,16 @@ def test_indices_are_drawn_by_rank_and_as_means_of_runs(make_plan):
     np.testing.assert_allclose(panel.lines[0].get_xydata(), np.column_stack([np.arange(1, 7), mean]))
 
 
+def test_some_of_many_designs_are_drawn_at_their_ranks(make_plan, monkeypatch):
+    """The dots and lines of thousands would be a solid band."""
+    data = make_plan(12, count=100)
+    monkeypatch.setattr(indices, "MOST_DESIGNS", 5)
+    panel = indices.draw(data).axes[list(indices.PANELS).index("residence_order")]
+    order = dataset.ranked_designs(data)["experiment"].tolist()[::3]
+    mean = data["residence_order"].sel(experiment=order).mean("replicate")
+    np.testing.assert_allclose(panel.lines[0].get_xydata(), np.column_stack([[1, 4, 7, 10], mean]))
+
+
 def table_of_effects(factors, shift=0.0):
     rows = itertools.product(factors, range(5), style.OBJECTIVES)
     table = pd.DataFrame(rows, columns=["factor", "level", "objective"])

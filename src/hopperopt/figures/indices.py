@@ -24,6 +24,7 @@ PANELS = {
     "mass_flow_index": "mass-flow index",
     definitions.ORDER: "residence order",
 }
+MOST_DESIGNS = 100
 COLUMNS, FRAME, GAPS = 3, style.Frame(left=12, right=2, bottom=9, top=10), (13.0, 8.0)
 DOTS = {"linestyle": "", "marker": "o", "markersize": 2.5}
 RANDOM = {"linewidth": 0.6, "linestyle": "--"}
@@ -38,19 +39,23 @@ def write(params: Mapping, dataset: str | os.PathLike, outputs: Sequence[str | o
 def draw(dataset: xr.Dataset) -> Figure:
     """Draw each index over the designs' rank: the mean of a design's runs, and a line from least to largest.
 
-    dataset: the plan's data set. Objectives are sign(U) sqrt|U|, the mean that of U. Dashed: what a random
-    mixture has.
+    dataset: the plan's data set, of which at most 100 designs are shown, every so manyth rank. Objectives are
+    sign(U) sqrt|U|, the mean that of U. Dashed: what a random mixture has.
     """
     figure = style.page(style.PAGE, 110)
-    ranked = dataset.sel(experiment=ranked_designs(dataset)["experiment"].to_numpy())
+    names = ranked_designs(dataset)["experiment"].to_numpy()
+    every = -(-len(names) // MOST_DESIGNS)
+    ranked, ranks = dataset.sel(experiment=names[::every]), np.arange(1, len(names) + 1, every)
     axes = style.panels(figure, len(PANELS) // COLUMNS, COLUMNS, FRAME, GAPS, sharex=True)
     for panel, (name, title) in zip(axes.flat, PANELS.items(), strict=True):
         values = ranked[name]
         sizes = outflow.SIZE_CLASSES if "size_class" in values.dims else (None,)
-        for shift, size in zip(0.25 * np.arange(-(len(sizes) // 2), len(sizes) / 2), sizes, strict=True):
+        shifts = 0.25 * every * np.arange(-(len(sizes) // 2), len(sizes) / 2)
+        for shift, size in zip(shifts, sizes, strict=True):
             of_size = values if size is None else values.sel(size_class=size)
             colour = style.INK if size is None else style.COLOURS[size]
-            _draw_runs(panel, of_size.transpose("experiment", "replicate").values, shift, colour, name)
+            runs = of_size.transpose("experiment", "replicate").values
+            _draw_runs(panel, ranks + shift, runs, colour, name)
             if name == "relative_deviation":
                 random = float(ranked["random_deviation"].sel(size_class=size).mean())
                 panel.axhline(random, color=colour, zorder=0, **RANDOM)
@@ -58,7 +63,7 @@ def draw(dataset: xr.Dataset) -> Figure:
             panel.text(0.5, 0.5, "not measured", transform=panel.transAxes, ha="center", color=style.FAINT)
             panel.set_yticks([])
         panel.set_title(title, loc="left")
-        panel.set_xlim(0.2, ranked.sizes["experiment"] + 0.8)
+        panel.set_xlim(1 - 0.8 * every, ranks[-1] + 0.8 * every)
         panel.locator_params(axis="y", nbins=5)
         panel.locator_params(axis="x", integer=True)
     for panel in axes[-1]:
@@ -68,11 +73,11 @@ def draw(dataset: xr.Dataset) -> Figure:
     return figure
 
 
-def _draw_runs(panel, values, shift, colour, name):
-    """Draw means and ranges of (design, run), beside the ranks by a shift; none where a design has no run."""
+def _draw_runs(panel, places, values, colour, name):
+    """Draw means and ranges of (design, run) at places (design,); none where a design has no run."""
     rows = np.flatnonzero(np.isfinite(values).any(axis=1))
     mean, least, largest = (pick(values[rows], axis=1) for pick in (np.nanmean, np.nanmin, np.nanmax))
     if name.startswith("U"):
         mean, least, largest = map(outflow.signed_root, (mean, least, largest))
-    panel.vlines(rows + 1 + shift, least, largest, color=colour, linewidth=0.5)
-    panel.plot(rows + 1 + shift, mean, color=colour, **DOTS)
+    panel.vlines(places[rows], least, largest, color=colour, linewidth=0.5)
+    panel.plot(places[rows], mean, color=colour, **DOTS)
