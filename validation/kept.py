@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hopperopt.provenance import solver_digest
+from hopperopt.provenance import PACKAGE, code_digest
 
 STORE = Path(__file__).resolve().parent.parent / ".validation"
 
@@ -18,7 +18,7 @@ def kept(name, key, make, solver=True):
     Arguments: `name`, for people; `key`, whatever JSON can hold that the run depends on; `make`, a function
     that returns a dict of arrays; `solver`, whether the run depends on this project's solver.
     """
-    text = json.dumps([key, solver_digest() if solver else None], sort_keys=True)
+    text = json.dumps([key, _solver_digest() if solver else None], sort_keys=True)
     path = STORE / f"{name}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.npz"
     if not path.exists():
         STORE.mkdir(exist_ok=True)
@@ -27,3 +27,9 @@ def kept(name, key, make, solver=True):
         torn.replace(path)
     with np.load(path) as arrays:
         return dict(arrays)
+
+
+def _solver_digest():
+    """Digest of the solver's code, without comments."""
+    names = sorted(path.stem for path in (PACKAGE / "dem").glob("*.py") if path.stem != "__init__")
+    return code_digest(*(f"hopperopt.dem.{name}" for name in names))

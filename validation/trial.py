@@ -83,7 +83,7 @@ def _run(folder):
     from hopperopt import provenance
 
     # The tests name the cache of compiled code before numba is imported; here it is imported already.
-    cache = folder / "cache" / "hopperopt" / f"numba-{provenance.solver_digest()}"
+    cache = folder / "cache" / "hopperopt" / provenance.numba_cache_name()
     os.environ["NUMBA_CACHE_DIR"] = str(cache)
     kinds = {}
 

@@ -52,10 +52,10 @@ def files_digest(folder: Path, *names: str) -> str:
     return hashlib.sha256(b"\0".join((folder / name).read_bytes() for name in names)).hexdigest()[:20]
 
 
-def solver_digest(package: Path = PACKAGE) -> str:
-    """Digest of the code of all modules of the compiled solver."""
-    names = sorted(path.stem for path in (package / "dem").glob("*.py") if path.stem != "__init__")
-    return code_digest(*(f"{package.name}.dem.{name}" for name in names), package=package)
+def numba_cache_name(package: Path = PACKAGE) -> str:
+    """Name of the compiled solver's folder, which tells all that stands in its files."""
+    folder = package / "dem"
+    return f"numba-{files_digest(folder, *sorted(path.name for path in folder.glob('*.py')))}"
 
 
 def _source_file(package: Path, module: str) -> Path | None:
@@ -146,13 +146,13 @@ def use_numba_cache() -> Path:
     """Give numba a cache directory of this solver's code and return it, before numba is imported.
 
     Numba does not see that a function called from another file has changed, hence a directory per digest of
-    all of the solver's code, below $XDG_CACHE_HOME or ~/.cache, or below the temporary directory where that
+    all of the solver's files, below $XDG_CACHE_HOME or ~/.cache, or below the temporary directory where that
     cannot be written.
     """
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path("~", ".cache").expanduser())
     fallback = Path(tempfile.gettempdir(), f"cache-{os.getuid()}")
     for base in (home, fallback):
-        directory = base.absolute() / "hopperopt" / f"numba-{solver_digest()}"
+        directory = base.absolute() / "hopperopt" / numba_cache_name()
         try:
             directory.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=directory).close()
