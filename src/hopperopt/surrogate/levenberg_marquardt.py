@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg.lapack import dposv
 
 from hopperopt.surrogate.network import Weights, flatten, forward, normal_equations, one_thread, unflatten
 
@@ -177,14 +178,10 @@ def _linearise(weights, parts, evaluated):
 
 def _damped_solution(matrix, mu, gradient):
     """Solve (matrix + mu 1) x = gradient of every network; 0 where singular: no progress, mu grows."""
+    solution = np.zeros_like(gradient)
     damped = matrix + mu[:, None, None] * np.eye(matrix.shape[1])
-    try:
-        return np.linalg.solve(damped, gradient[..., None])[..., 0]
-    except np.linalg.LinAlgError:
-        solution = np.zeros_like(gradient)
-        for network in range(len(matrix)):
-            try:
-                solution[network] = np.linalg.solve(damped[network], gradient[network])
-            except np.linalg.LinAlgError:
-                continue
-        return solution
+    for network in range(len(matrix)):
+        _, step, failed = dposv(damped[network].T, gradient[network], overwrite_a=True)
+        if not failed:
+            solution[network] = step
+    return solution

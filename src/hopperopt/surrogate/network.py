@@ -152,9 +152,10 @@ def normal_equations(
     count, outputs, width = weights.output.shape
     hidden_nodes, inputs_count = width - 1, len(inputs)
     slopes = activations[:, :-1] * (1 - activations[:, :-1])
-    basis = np.concatenate(
-        [activations, (slopes[:, :, None] * inputs).reshape(count, hidden_nodes * inputs_count, -1)], axis=1
-    )
+    basis = np.empty((count, width + hidden_nodes * inputs_count, inputs.shape[1]))
+    basis[:, :width] = activations
+    by_input = basis[:, width:].reshape(count, hidden_nodes, inputs_count, -1)
+    np.multiply(slopes[:, :, None], inputs, out=by_input)
     gram = basis @ basis.swapaxes(1, 2)
     projected = residuals @ basis.swapaxes(1, 2)
 
