@@ -255,6 +255,7 @@ def warnings(study):
     extremes = [("a corner", corner, study.with_design(corner)) for corner in corners]
     refused = _grouped(extremes, findings.refused)
     found += _other_level(study)
+    found += study.unused_columns()
     found += _narrow_plan(study)
     found += _far_cases(study)
     return found + [f"the optimiser may propose designs that are refused: {sentence}" for sentence in refused]

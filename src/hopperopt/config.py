@@ -653,6 +653,7 @@ class Study(Setup):
     verification: Verification = Verification()
     figures: Figures = Figures()
     _own_plan: list = PrivateAttr(default_factory=list)
+    _unused_columns: list = PrivateAttr(default_factory=list)
 
     @property
     def state_dir(self):
@@ -691,6 +692,11 @@ class Study(Setup):
                 return plans.sobol(self.levels, self.design.sobol.experiments, self.design.sobol.seed)
             case "csv":
                 return self._own_plan
+
+    def unused_columns(self):
+        """A sentence for each column of an own plan that is no factor's."""
+        told = f"design.csv.file: {self.design.csv.file} has a column"
+        return [f"{told} {column}, which is no factor and not used" for column in self._unused_columns]
 
     def experiments(self):
         """(name, design) of each experiment of the plan, in its order."""
@@ -915,7 +921,9 @@ def _with_files(study, directory):
             found.append(f"{error} (from {own.file})")
     if study.design.plan == "csv":
         try:
-            study._own_plan = plans.from_csv(read_text(directory / study.design.csv.file), study.levels)
+            text = read_text(directory / study.design.csv.file)
+            study._own_plan = plans.from_csv(text, study.levels)
+            study._unused_columns = plans.unused_columns(text, study.levels)
         except NotAllowed as error:
             found.append(mistake("design.csv.file", study.design.csv.file, error))
     return study, found

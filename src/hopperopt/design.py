@@ -136,6 +136,13 @@ def from_csv(text, factors):
     return experiments
 
 
+def unused_columns(text, factors):
+    """Columns of an own plan that are no factor's, nor the levels that design.csv has."""
+    columns = next(csv.reader(io.StringIO(text), skipinitialspace=True))
+    own = {"experiment", *factors, *(f"{factor}_level" for factor in factors)}
+    return [column for column in columns if column not in own]
+
+
 def _rows(text, columns):
     """Rows of a CSV text as dicts; none where a column is missing or there twice, or it is no CSV."""
     reader = csv.DictReader(io.StringIO(text), skipinitialspace=True)
