@@ -52,6 +52,46 @@ def test_some_of_many_experiments_find_the_hyperparameters_and_all_predict(synth
     assert (np.sqrt(np.mean(difference**2, axis=(0, 2))) < synthetic.noise / np.sqrt(3)).all()
 
 
+def test_of_many_experiments_some_are_inducing_ones(synthetic, monkeypatch):
+    """Curves, draws and what is learnt from a design that is believed are those of the exact processes."""
+    data, designs = synthetic.training(3), synthetic.anywhere(20, np.random.default_rng(0))
+    new = designs[:1]
+    found = []
+    for exact in (25, 20):
+        monkeypatch.setattr(process, "EXACT", exact)
+        model = gaussian.fit(data)
+        assert {type(one).__name__ for one in model._processes} == (
+            {"GaussianProcessRegressor"} if exact == 25 else {"Inducing"}
+        )
+        drawn = model.draws(designs, GRID, 400, np.random.default_rng(1))
+        found.append((*model.moments(designs, GRID), drawn.mean(axis=0), drawn.var(axis=0)))
+        before, after = model.moments(new, GRID)[1], model.believing(new[0], 10).moments(new, GRID)[1]
+        found[-1] += (after / before,)
+    exact, inducing = found
+    error = synthetic.noise[:, None] / np.sqrt(3)
+    for ours, theirs in zip(inducing[:4:2], exact[:4:2], strict=True):
+        assert (np.abs(ours - theirs) < 0.3 * error).all()
+    for ours, theirs in zip(inducing[1::2], exact[1::2], strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=0.25)
+    np.testing.assert_allclose(inducing[4], exact[4], atol=0.1)
+
+
+def test_inducing_inputs_know_the_latest_design(monkeypatch):
+    """A batch of infill believes each design before it looks for the next one."""
+    rng = np.random.default_rng(5)
+    inputs, values = np.vstack([rng.uniform(-1, 1, (399, 4)), np.zeros(4)]), rng.normal(size=400)
+    monkeypatch.setattr(process, "EXACT", 100)
+    kernel, noise = ConstantKernel(1000.0) * Matern(np.full(4, 2.0), nu=2.5), np.append(np.ones(399), 0.01)
+    _, deviation = process.conditioned(kernel, inputs, values, noise).predict(inputs[-1:], return_std=True)
+    assert deviation == pytest.approx(0.1, rel=0.05)
+
+
+def test_inducing_inputs_are_the_latest_and_those_far_apart():
+    points = np.array([[0.0], [1.0], [9.0], [10.0], [4.0], [10.0], [8.0]])
+    assert process.far_apart(points, 4, [5, 3, 6]).tolist() == [5, 6, 0, 4]
+    assert sorted(process.far_apart(points, 10, []).tolist()) == [0, 1, 2, 3, 4, 6]
+
+
 def test_the_processes_are_conditioned_once(synthetic, monkeypatch):
     """It takes the cube of the number of experiments, and a search predicts a hundred times."""
     model, fitted = gaussian.fit(synthetic.training(3)), []
@@ -83,7 +123,7 @@ def test_many_values_condition_a_process_by_inducing_inputs(monkeypatch):
     monkeypatch.setattr(process, "EXACT", 150)
     many = process.conditioned(kernel, inputs, values, noise)
     missed, wrong = compared(many)
-    assert missed < 0.1 and wrong < 0.05
+    assert missed < 0.1 and wrong < 0.1
     part = slice(150)
     assert compared(process.conditioned(kernel, inputs[part], values[part], noise[part]))[0] > 5 * missed
     covariance = exact.predict(elsewhere, return_cov=True)[1]

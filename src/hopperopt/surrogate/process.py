@@ -6,12 +6,15 @@ learning of inducing variables in sparse Gaussian processes, AISTATS 2009, 567-5
 """
 
 import warnings
+from collections.abc import Iterable
 
 import numpy as np
 
 SEARCHED = 500  # values at most in a search for a kernel's parameters
 EXACT = 1000  # values at most with which a process is conditioned as it is; inducing inputs of more
-JITTER = 1e-9  # of the process' variance, on the diagonal of the inducing inputs' covariance
+# Of the process' variance, on the diagonal of the inducing inputs' covariance, which may be singular. Where
+# the variance is more than a million times that of the noise, predictions are less sure for it.
+JITTER = 1e-9
 
 
 def likeliest(kernel, inputs: np.ndarray, values: np.ndarray, noise=1e-10, restarts: int = 0):
@@ -48,26 +51,32 @@ def conditioned(kernel, inputs: np.ndarray, values: np.ndarray, noise: np.ndarra
 class Inducing:
     """A process that knows of its values what they say of it at some of their inputs, m of n.
 
-    To condition it takes n m^2, a prediction m^2 for each input.
+    To condition it takes n m^2, a prediction m^2 for each input. A tenth of the inducing inputs are the
+    latest: a search for the best designs asks what is known close to those that it has added.
+
+    kernel, inputs (n, factors), values (n,) and noise (n,) as in `conditioned`.
     """
 
-    def __init__(self, kernel, inputs, values, noise):
+    def __init__(self, kernel, inputs: np.ndarray, values: np.ndarray, noise: np.ndarray):
         from scipy.linalg import cholesky, solve_triangular  # slow to import
 
+        latest = range(len(values) - EXACT // 10, len(values))
+        chosen = far_apart(inputs / kernel.k2.length_scale, EXACT, latest)
         self.kernel = kernel
-        self.inputs = inputs[far_apart(inputs / kernel.k2.length_scale, EXACT)]
-        prior = kernel(self.inputs) + JITTER * kernel.k1.constant_value * np.eye(len(self.inputs))
-        self.prior = cholesky(prior, lower=True)
-        seen = solve_triangular(self.prior, kernel(self.inputs, inputs), lower=True) / np.sqrt(noise)
-        self.posterior = cholesky(np.eye(len(self.inputs)) + seen @ seen.T, lower=True)
-        self.weights = solve_triangular(self.posterior, seen @ (values / np.sqrt(noise)), lower=True)
+        self.inputs = inputs[chosen]  # (m, factors)
+        prior = kernel(self.inputs) + JITTER * kernel.k1.constant_value * np.eye(len(chosen))
+        self.lower = cholesky(prior, lower=True)  # (m, m), L of K_mm = L L'
+        seen = solve_triangular(self.lower, kernel(self.inputs, inputs), lower=True) / np.sqrt(noise)
+        # (m, m), of 1 + A A' with A = L^-1 K_mn / sqrt(noise)
+        self.informed = cholesky(np.eye(len(chosen)) + seen @ seen.T, lower=True)
+        self.weights = solve_triangular(self.informed, seen @ (values / np.sqrt(noise)), lower=True)  # (m,)
 
     def predict(self, inputs: np.ndarray, return_std: bool = False, return_cov: bool = False):
         """Mean (n,) at inputs (n, factors), and standard deviation (n,) or covariance (n, n) if asked for."""
         from scipy.linalg import solve_triangular
 
-        known = solve_triangular(self.prior, self.kernel(self.inputs, inputs), lower=True)
-        left = solve_triangular(self.posterior, known, lower=True)
+        known = solve_triangular(self.lower, self.kernel(self.inputs, inputs), lower=True)
+        left = solve_triangular(self.informed, known, lower=True)
         mean = left.T @ self.weights
         if return_cov:
             return mean, self.kernel(inputs) - known.T @ known + left.T @ left
@@ -77,13 +86,19 @@ class Inducing:
         return mean
 
 
-def far_apart(points: np.ndarray, number: int) -> np.ndarray:
-    """Indices of so many points, of (n, d), each the farthest from those before it.
+def far_apart(points: np.ndarray, number: int, first: Iterable[int]) -> np.ndarray:
+    """Indices of so many points of (n, d): those of `first`, then the farthest from all before it each time.
 
-    Fewer where points coincide. Gonzalez, Theoretical Computer Science 38 (1985) 293-306.
+    None coincides with another: there may be fewer. Gonzalez, Theoretical Computer Science 38 (1985) 293-306.
     """
-    chosen, distance = [0], np.sum((points - points[0]) ** 2, axis=1)
+    chosen: list[int] = []
+    distance, first = np.full(len(points), np.inf), iter(first)
     while len(chosen) < number and distance.max() > 0:
-        chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.sum((points - points[chosen[-1]]) ** 2, axis=1))
+        one = next(first, None)
+        if one is None:
+            one = int(np.argmax(distance))
+        elif not distance[one] > 0:
+            continue
+        chosen.append(one)
+        distance = np.minimum(distance, np.sum((points - points[one]) ** 2, axis=1))
     return np.array(chosen)
