@@ -140,7 +140,7 @@ def unused_columns(text, factors):
     """Columns of an own plan that are no factor's, nor the levels that design.csv has."""
     columns = next(csv.reader(io.StringIO(text), skipinitialspace=True))
     own = {"experiment", *factors, *(f"{factor}_level" for factor in factors)}
-    return [column for column in columns if column not in own]
+    return [column for column in columns if column and column not in own]
 
 
 def _rows(text, columns):

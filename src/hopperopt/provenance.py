@@ -53,7 +53,7 @@ def files_digest(folder: Path, *names: str) -> str:
 
 
 def numba_cache_name(package: Path = PACKAGE) -> str:
-    """Name of the compiled solver's folder, which tells all that stands in its files."""
+    """Name of the compiled solver's folder: another one after any change of the solver's files."""
     folder = package / "dem"
     return f"numba-{files_digest(folder, *sorted(path.name for path in folder.glob('*.py')))}"
 

@@ -552,8 +552,8 @@ def test_own_plan_narrower_than_its_levels_is_a_warning(tmp_path):
 
 
 def test_columns_of_an_own_plan_that_are_no_factors_are_a_warning(tmp_path):
-    rows = [f"{row},,22.5" for row in FOUR_ROWS.split()[1:]]
-    text = "\n".join([f"{FOUR_ROWS.split()[0]},length_mm_level,outlet_radius_mm", *rows])
+    rows = [f"{row},,22.5," for row in FOUR_ROWS.split()[1:]]
+    text = "\n".join([f"{FOUR_ROWS.split()[0]},length_mm_level,outlet_radius_mm,", *rows])
     study = config.parse({**plan_file(tmp_path, text), "factors": TWO_FACTORS}, tmp_path)
     (line,) = [line for line in study.warnings() if "column" in line]
     assert line.startswith("design.csv.file: plan.csv has a column outlet_radius_mm, which is no factor")

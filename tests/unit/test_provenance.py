@@ -60,9 +60,11 @@ def test_digest_refuses_a_name_that_is_no_module(package):
 def test_cache_directory_is_writable_and_named_after_the_solver(package, tmp_path, monkeypatch):
     (package / "dem").mkdir()
     (package / "dem" / "laws.py").write_text("stiffness = 1\n")
-    before = provenance.numba_cache_name(package)
-    (package / "dem" / "walls.py").write_text("stiffness = 1\n")
-    assert provenance.numba_cache_name(package) != before
+    names = [provenance.numba_cache_name(package)]
+    for name, stiffness in (("walls", 1), ("laws", 2), ("walls", 2)):
+        (package / "dem" / f"{name}.py").write_text(f"stiffness = {stiffness}\n")
+        names.append(provenance.numba_cache_name(package))
+    assert len(set(names)) == 4
     monkeypatch.setenv("NUMBA_CACHE_DIR", "")
     monkeypatch.setitem(sys.modules, "numba", None)
     del sys.modules["numba"]

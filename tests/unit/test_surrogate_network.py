@@ -158,6 +158,12 @@ def test_a_dead_node_does_not_stop_the_training():
     assert fitted.training_error[0] < 0.5 * before
 
 
+def test_a_step_that_cannot_be_solved_for_is_none():
+    matrices, gradients = np.stack([np.eye(2), -np.eye(2)]), np.array([[3.0, 4.0], [3.0, 4.0]])
+    steps = levenberg_marquardt._damped_solution(matrices, np.array([1.0, 0.5]), gradients)
+    np.testing.assert_allclose(steps, [[1.5, 2], [0, 0]])
+
+
 def test_scalings_keep_constant_columns():
     values = np.column_stack([np.linspace(3, 5, 9), np.full(9, 7.0)])
     for make in (network.range_scaling, network.standard_scaling):

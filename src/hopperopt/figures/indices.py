@@ -57,7 +57,7 @@ def draw(dataset: xr.Dataset) -> Figure:
             runs = of_size.transpose("experiment", "replicate").values
             _draw_runs(panel, ranks + shift, runs, colour, name)
             if name == "relative_deviation":
-                random = float(ranked["random_deviation"].sel(size_class=size).mean())
+                random = float(dataset["random_deviation"].sel(size_class=size).mean())
                 panel.axhline(random, color=colour, zorder=0, **RANDOM)
         if not np.isfinite(values).any():
             panel.text(0.5, 0.5, "not measured", transform=panel.transAxes, ha="center", color=style.FAINT)

@@ -147,7 +147,7 @@ def _step(state, best, shape, training, validation):
 
 
 def _evaluate(weights, parts):
-    """Activations and residuals of n networks for each part of a sample."""
+    """Activations (n, hidden + 1, rows) and residuals (n, outputs, rows) of n networks for each part."""
     evaluated = []
     for part in parts:
         activations, outputs = forward(weights, part.inputs)
@@ -156,7 +156,7 @@ def _evaluate(weights, parts):
 
 
 def _mean_square(evaluated):
-    """Mean squared residual (n,) of n networks."""
+    """Mean squared residual (n,) of n networks, from what `_evaluate` returns."""
     squares = [(residuals**2).reshape(len(residuals), -1) for _, residuals in evaluated]
     return sum(part.sum(axis=1) for part in squares) / sum(part.shape[1] for part in squares)
 
@@ -167,7 +167,7 @@ def _monitor(weights, training_error, validation):
 
 
 def _linearise(weights, parts, evaluated):
-    """J'J and J'e over the number of residuals, of n networks."""
+    """J'J and J'e over the number of residuals, of n networks, from what `_evaluate` returns."""
     size = sum(part.targets.size for part in parts)
     matrix = gradient = 0.0
     for part, (activations, residuals) in zip(parts, evaluated, strict=True):
@@ -177,7 +177,10 @@ def _linearise(weights, parts, evaluated):
 
 
 def _damped_solution(matrix, mu, gradient):
-    """Solve (matrix + mu 1) x = gradient of every network; 0 where singular: no progress, mu grows."""
+    """Solve (matrix + mu 1) x = gradient of every network by Cholesky's factors.
+
+    0 where rounding leaves it not positive definite: no progress, mu grows.
+    """
     solution = np.zeros_like(gradient)
     damped = matrix + mu[:, None, None] * np.eye(matrix.shape[1])
     for network in range(len(matrix)):
