@@ -44,7 +44,7 @@ Within, every monitor is inside its bound; beyond, a run with one that is not ha
 
 While those within were drawn, this many were refused by each key: {refused}; and warned of: {warned}.
 """
-FEW_DOCUMENTS, FEW_DESIGNS = 50, 20
+FEW_DOCUMENTS, FEW_DESIGNS = 50, 12
 
 
 def main():
