@@ -255,7 +255,7 @@ def warnings(study):
     extremes = [("a corner", corner, study.with_design(corner)) for corner in corners]
     refused = _grouped(extremes, findings.refused)
     found += _other_level(study)
-    found += study.unused_columns()
+    found += _unused_columns(study)
     found += _narrow_plan(study)
     found += _far_cases(study)
     return found + [f"the optimiser may propose designs that are refused: {sentence}" for sentence in refused]
@@ -273,6 +273,13 @@ def _other_level(study):
             f"filling.level_mm: {count} particles fill the hopper to about {reached} mm, not {level:g} mm; "
             "the height of their fall, drawing, warnings and logs go by that level"
         )
+
+
+def _unused_columns(study):
+    """Columns of an own plan from which nothing follows."""
+    file = study.design.csv.file
+    for column in study.unused_columns:
+        yield f"design.csv.file: {file} has a column {column}, which is no factor and not used"
 
 
 def _narrow_plan(study):

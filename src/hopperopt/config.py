@@ -693,10 +693,10 @@ class Study(Setup):
             case "csv":
                 return self._own_plan
 
+    @property
     def unused_columns(self):
-        """A sentence for each column of an own plan that is no factor's."""
-        told = f"design.csv.file: {self.design.csv.file} has a column"
-        return [f"{told} {column}, which is no factor and not used" for column in self._unused_columns]
+        """Columns of an own plan that are no factor's."""
+        return self._unused_columns
 
     def experiments(self):
         """(name, design) of each experiment of the plan, in its order."""
