@@ -9,7 +9,7 @@
 # make test-cluster        the study on a Slurm cluster of virtual nodes: as root on Debian, an hour
 # make validation         the solver against closed forms and other codes: rewrites docs/validation.md; CASE=name for one
 # make archive             configuration, lock, data, tables and figures of the study as one zip file
-# make reference           config/config.schema.json and docs/configuration.md anew, from the models in config.py
+# make reference           config/config.schema.json and docs/configuration.md anew, from the models in hopperopt.config
 # make lock                the newest versions of all libraries into requirements.lock
 # make PYTHON=python3.12   another Python for the environment;   make CORES=4   fewer cores for the study
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hopperopt import config, experiment, outflow
+from hopperopt.config.setup import Particles
 
 STATUSES = ("complete", "jammed", "incomplete", "unsettled", "monitor")
 BOUNDS = {"max_overlap": 0.3, "max_speed_ratio": 2.0, "max_energy_gain": 0.01, "lost_particles": 0}
@@ -137,7 +138,7 @@ def _document(rng):
         "surrogate": {"selected_hidden_nodes": 7, "validation_experiments": 1, "test_experiments": 1},
         "verification": {"cases": {"bare": "bare"}},
     }
-    rayleigh = config.Particles.model_validate(document["particles"]).rayleigh_time
+    rayleigh = Particles.model_validate(document["particles"]).rayleigh_time
     return document | {"simulation": {"time_step_s": step * rayleigh}}
 
 

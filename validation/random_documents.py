@@ -18,6 +18,7 @@ import pandas as pd
 from hypothesis import strategies as st
 
 from hopperopt import config, dataset, document, experiment, files
+from hopperopt.config.stages import STAGES
 
 PARTICLES, STEPS = 36, 10_000  # of a run, STEPS before and after the opening
 FINEST_STEP = 2e-7  # s; a run with a finer step is not made
@@ -231,7 +232,7 @@ def outcome(raw):
                 assert _names_a_key(sentence, raw), sentence
             return "refused", None
         assert all(warning.isprintable() for warning in study.warnings())
-        for params in map(study.stage_params, config.STAGES):
+        for params in map(study.stage_params, STAGES):
             # Some hold a case, where a rigid wall has an infinite modulus.
             json.dumps(params, allow_nan="derived" in params)
         json.dumps(study.derived_params("selected", 1))

@@ -11,7 +11,7 @@ from hopperopt.quantity import Quantity
 HEADING = """\
 # Every key of the configuration
 
-Made by `make reference` from the models in `src/hopperopt/config.py`, as is `config/config.schema.json`,
+Made by `make reference` from the models in `src/hopperopt/config/`, as is `config/config.schema.json`,
 which tells editors the same. [config/README.md](../config/README.md) says how files are merged and checked.
 NAME stands for a name of your own.
 """
@@ -19,12 +19,12 @@ NAME stands for a name of your own.
 
 def schema() -> str:
     """Text of the JSON schema."""
-    return json.dumps(config.json_schema(), indent=2, ensure_ascii=False) + "\n"
+    return json.dumps(_json_schema(), indent=2, ensure_ascii=False) + "\n"
 
 
 def page() -> str:
     """Text of the page: a table for each section, a row for each key."""
-    made, text, single = config.json_schema(), HEADING, []
+    made, text, single = _json_schema(), HEADING, []
     for name, entry in made["properties"].items():
         rows = list(_rows(made, name, entry))
         if rows[0][0] == name:
@@ -32,6 +32,30 @@ def page() -> str:
         else:
             text += _table(f"`{name}`", _about(made, entry), rows)
     return text + _table("Single keys", "At the top level.", single)
+
+
+def _json_schema() -> dict:
+    """JSON schema of a document, an override included: no key is required, entries by name may be null."""
+    made = config.Study.model_json_schema()
+    for part in (made, *made["$defs"].values()):
+        part.pop("required", None)
+        for entries in part["properties"].values():
+            entries.pop("title", None)
+            if "description" in entries:
+                entries["description"] = " ".join(entries["description"].split())
+            if "$ref" in entries:
+                entries.pop("default", None)
+            for kind in ("patternProperties", "additionalProperties"):
+                if isinstance(entries.get(kind), dict):
+                    entries[kind] = _or_null(entries[kind], kind == "patternProperties")
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made}
+
+
+def _or_null(entry: dict, by_pattern: bool) -> dict:
+    """The schema of an entry by name that null leaves out."""
+    if by_pattern:
+        return {pattern: _or_null(each, False) for pattern, each in entry.items()}
+    return {"anyOf": [entry, {"type": "null"}]}
 
 
 def _about(made: Mapping, entry: Mapping) -> str:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from hopperopt import config, document
 from hopperopt.config import ConfigError
+from hopperopt.config.stages import STAGES
 
 ROOT = Path(__file__).parents[2]
 CENTRE = {"theta_deg": 55, "length_mm": 40, "height_mm": 29.6}
@@ -769,7 +770,7 @@ def test_stage_params_hold_their_own_settings_in_order():
     assert [name for name, _ in cases] == list(study.cases())
     assert cases[0] == ["selected", "selected"] and cases[-2:] == [["paper", "design"], ["bare", "bare"]]
     assert study.stage_params("train")["hidden_nodes"] == [3, 4, 5, 6, 7, 8, 9, 10]
-    for stage in config.STAGES:
+    for stage in STAGES:
         params = study.stage_params(stage)
         assert json.loads(json.dumps(params, sort_keys=True)) == params
 

@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from hopperopt import config, document, reference
+from hopperopt.mistakes import sentences
 
 ROOT = Path(__file__).parents[2]
 MULTIPLES = {"filling.particles", "design.sobol.experiments"}  # not every number within the bounds
@@ -74,7 +75,7 @@ def said(path, value):
     try:
         config.Study.model_validate(value)
     except ValueError as error:
-        return "\n".join(config.sentences(error.errors(include_url=False), config.Study))
+        return "\n".join(sentences(error.errors(include_url=False), config.Study))
     return ""
 
 
