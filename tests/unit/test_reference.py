@@ -68,6 +68,13 @@ def test_schema_has_the_bounds_that_the_models_enforce(schema):
     assert checked > 60
 
 
+def test_rigid_wall_is_no_mistake_to_an_editor(schema):
+    """.inf is allowed, so the schema cannot have a maximum there."""
+    rigid = dict(leaves(schema, schema))["wall", "shear_modulus_pa"]
+    assert said(("wall", "shear_modulus_pa"), math.inf) == ""
+    assert "maximum" not in rigid and "exclusiveMaximum" not in rigid and rigid["minimum"] == 1000
+
+
 def said(path, value):
     """What is wrong with a document of one value, for its key alone."""
     for part in reversed(path):

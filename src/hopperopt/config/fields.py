@@ -30,7 +30,7 @@ class Number(Quantity):
             "exclusiveMinimum": self.above,
             "minimum": self.least,
             "exclusiveMaximum": self.below,
-            "maximum": self.most,
+            "maximum": None if self.infinite else self.most,
         }
         for kind in made.get("anyOf", [made]):
             if kind.get("type") in ("number", "integer"):

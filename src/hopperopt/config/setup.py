@@ -63,7 +63,7 @@ class Wall(Model):
     """Material of hopper, gate and insert; an infinite modulus is a rigid wall."""
 
     shear_modulus_pa: Annotated[float, Number(least=1000, most=1e13, infinite=True)] = 2.2e7
-    """Shear modulus of the wall; `.inf` is a rigid one."""
+    """Shear modulus of the wall, at most 1e13; `.inf` is a rigid one."""
     poisson_ratio: Poisson = 0.25
     """Poisson's ratio of the wall."""
 
