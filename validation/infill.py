@@ -129,7 +129,11 @@ def campaign(truth, seed):
     corner = infill.corner(predictor)
     for number in range(1, ROUNDS + 1):
         found = infill.designs(
-            params | {"round": number, "names": plans.proposals(number, BATCH)}, predictor, corner, front
+            params | {"round": number, "names": plans.proposals(number, BATCH)},
+            predictor,
+            corner,
+            front,
+            np.empty((0, len(FACTORS))),  # no run is dropped
         )
         data = xr.concat(
             [data, truth.simulate(found[list(FACTORS)].to_numpy(), rng)], "experiment", data_vars="minimal"

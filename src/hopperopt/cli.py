@@ -91,7 +91,7 @@ STAGES = {
     "propose": Stage(
         "infill",
         "propose",
-        ("surrogate", "plan", "front"),
+        ("surrogate", "plan", "front", "proposals*"),
         ("proposals.csv",),
         "propose the designs of a round of infill",
     ),

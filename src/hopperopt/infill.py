@@ -8,7 +8,7 @@ kriging believer of Ginsbourger, Le Riche and Carraro 2010).
 """
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +33,7 @@ def propose(
     surrogate: str | os.PathLike,
     plan: str | os.PathLike,
     front: str | os.PathLike,
+    proposals: Sequence[str | os.PathLike],
     output: str | os.PathLike,
 ) -> None:
     """Write proposals.csv, the designs of one round.
@@ -41,12 +42,15 @@ def propose(
     `replicates`, runs of each design; `seed`; `case_of`, a function of a design that returns its case, None
     where it cannot be built. surrogate: path of model.nc, Gaussian processes of all that is simulated so far;
     plan: of those of the plan alone, whose largest J fix the corner of all rounds; front: path of front.csv,
-    of the first surrogate. Raises files.InputError where no design of the ranges can be built.
+    of the first surrogate; proposals: those of proposals.csv of the rounds before, of whose designs all runs
+    may have been dropped. Raises files.InputError where no design of the ranges can be built.
     """
     predictor, known = prediction.load(surrogate), prediction.load(plan)
     points = files.read_table(front, "selected", *predictor.factors)
     points = points.sort_values("selected", ascending=False, kind="stable")[list(predictor.factors)]
-    files.write_table(designs(params, predictor, corner(known), points.to_numpy(float)), output)
+    earlier = [files.read_table(path, *predictor.factors)[list(predictor.factors)] for path in proposals]
+    taken = pd.concat([points.iloc[:0], *earlier]).to_numpy(float)
+    files.write_table(designs(params, predictor, corner(known), points.to_numpy(float), taken), output)
 
 
 def corner(plan: prediction.Predictor) -> np.ndarray:
@@ -55,12 +59,16 @@ def corner(plan: prediction.Predictor) -> np.ndarray:
 
 
 def designs(
-    params: Mapping, predictor: prediction.Predictor, limits: np.ndarray, front: np.ndarray
+    params: Mapping,
+    predictor: prediction.Predictor,
+    limits: np.ndarray,
+    front: np.ndarray,
+    taken: np.ndarray,
 ) -> pd.DataFrame:
     """The designs of a round, a row each: what proposals.csv holds.
 
     params: as in `propose`; limits: the corner (2,); front (n, factors): designs of the front, the selected
-    one first.
+    one first; taken (m, factors): those of the rounds before.
     """
     names = list(predictor.factors)
     bounds = np.array([params["bounds"][name] for name in names], dtype=float)
@@ -71,7 +79,7 @@ def designs(
     def can_be_built(design):
         return params["case_of"](dict(zip(names, map(float, design), strict=True))) is not None
 
-    search = Search(bounds, limits, params["replicates"], can_be_built)
+    search = Search(bounds, limits, params["replicates"], can_be_built, taken)
     chosen = batch(predictor, candidates, len(params["names"]), search, params["seed"])
     table = pd.DataFrame(candidates[[row.candidate for row in chosen]], columns=names)
     table[list(OBJECTIVES)] = predictor.objectives(table.to_numpy())
@@ -95,6 +103,7 @@ class Search(NamedTuple):
     corner: np.ndarray  # (2,) of the hypervolumes
     replicates: int  # runs that each design will have
     can_be_built: Callable[[np.ndarray], bool]
+    taken: np.ndarray  # (m, factors) designs that were proposed before, simulated or not
 
 
 class Choice(NamedTuple):
@@ -112,7 +121,8 @@ def batch(
     front.
 
     That one comes first, then those of the largest expected improvement; each is at least a twentieth of the
-    range of some factor away from all that is simulated or chosen, as long as there is such a design.
+    range of some factor away from all that is simulated, was proposed before or is chosen, as long as there
+    is such a design.
     Impossible mass fractions are chosen only where nothing else is predicted. Raises files.InputError where
     too few candidates can be built.
     """
@@ -122,7 +132,7 @@ def batch(
     while len(chosen) < number:
         simulated = processes(predictor).designs
         gain = expected_improvement(predictor, candidates, search.corner, np.random.default_rng(seed))
-        distance = separation(candidates, simulated, search.bounds)
+        distance = separation(candidates, np.vstack([simulated, search.taken]), search.bounds)
         order = np.lexsort([distance, gain, distance >= APART])[::-1]
         selected = not chosen and distance[0] >= APART
         order = np.concatenate([[0], order]) if selected else order

@@ -6,6 +6,7 @@ They are indices of the surrogate: of each of many draws of what it says the out
 spread tells how well they are known.
 """
 
+import dataclasses
 import os
 from collections.abc import Mapping
 
@@ -36,7 +37,7 @@ def sensitivity(
     model.nc, for J, and of dataset.nc, for the discharge time, which has a Gaussian process of its own.
     Intervals are of the surrogate's draws; a single network, which has none, has no interval.
     """
-    predictor, data = prediction.load(surrogate), files.read_netcdf(dataset)
+    predictor, data = _smooth(prediction.load(surrogate)), files.read_netcdf(dataset)
     bounds = np.array([params["bounds"][name] for name in predictor.factors], dtype=float)
     rng = np.random.default_rng(params["seed"])
     designs = saltelli_designs(bounds, SAMPLES, rng)
@@ -50,6 +51,15 @@ def sensitivity(
     ]
     table = pd.concat(tables)
     files.write_table(table[["output", *table.columns.drop("output")]], output)
+
+
+def _smooth(predictor: prediction.Predictor) -> prediction.Predictor:
+    """Without what no component of Gaussian processes holds: noise of every design's own would look like an
+    interaction of all factors.
+    """
+    if not isinstance(predictor.model, gaussian.Gaussian):
+        return predictor
+    return predictor._replace(model=dataclasses.replace(predictor.model, rest=np.zeros(())))
 
 
 def saltelli_designs(bounds: np.ndarray, samples: int, rng: np.random.Generator) -> np.ndarray:

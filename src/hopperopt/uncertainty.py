@@ -60,9 +60,9 @@ class Estimate(NamedTuple):
         """One-sided p-value of "not below zero": small where the square is plainly negative."""
         return ndtr(self.in_deviations())
 
-    def detectable(self) -> np.ndarray:
-        """Smallest true value that a test at 5 %, one-sided, finds four times of five (80 % power)."""
-        return (ndtri(1 - LEVEL) + ndtri(POWER)) * np.sqrt(self.variance)
+    def detectable(self, level: float | np.ndarray) -> np.ndarray:
+        """Smallest true value that a one-sided test at a level finds four times of five (80 % power)."""
+        return (ndtri(1 - level) + ndtri(POWER)) * np.sqrt(self.variance)
 
 
 def of_runs(mass_fraction: np.ndarray, counting_variance: np.ndarray) -> Runs:

@@ -47,7 +47,8 @@ def judge(cases: Sequence[Case], target: np.ndarray) -> pd.DataFrame:
 
     target (size class,): mass fractions m_k0 of the batch. J is that of the mean curve of n runs. Differences
     are those of U, a case's less the bare hopper's, negative for less segregation; `detectable` is the
-    smallest one that is found with a power of 80 %. Empty: what needs a run, a prediction or a bare hopper
+    smallest one that the row's test, adjusted for the others as the least of their p-values is, finds with a
+    power of 80 %. Empty: what needs a run, a prediction or a bare hopper
     that is not there.
     """
     runs = uncertainty.stacked([case.runs for case in cases])
@@ -77,7 +78,7 @@ def judge(cases: Sequence[Case], target: np.ndarray) -> pd.DataFrame:
         "p_holm": better,
         "better_than_bare": np.where(np.isnan(better), None, better < uncertainty.LEVEL),
         "verdict": _words(better, worse),
-        "detectable": difference.detectable(),
+        "detectable": difference.detectable(_levels(difference.p_below(), primary)),
     }
     names = {
         "case": np.repeat([case.name for case in cases], len(OUTPUTS)),
@@ -101,6 +102,12 @@ def _adjusted(p, primary):
     adjusted = p.copy()
     adjusted[~primary] = uncertainty.holm(p[~primary].ravel()).reshape(-1, p.shape[1])
     return adjusted
+
+
+def _levels(p, primary):
+    """Levels (case, 1) of the tests of p-values (case, output): Holm's strictest but for primary cases."""
+    others = np.count_nonzero(np.isfinite(p[~primary]))
+    return np.where(primary, uncertainty.LEVEL, uncertainty.LEVEL / max(others, 1))[:, None]
 
 
 def _words(better, worse):

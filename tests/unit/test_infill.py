@@ -12,6 +12,7 @@ from hopperopt.surrogate import gaussian, prediction
 from validation import infill as campaigns
 
 CORNER = np.array([1.0, 2.0])
+NOTHING = np.empty((0, 3))  # no design
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +62,7 @@ def test_believed_runs_change_no_prediction_and_leave_less_to_be_learnt(predicto
 def test_a_batch_holds_the_selected_design_and_others_apart_from_all(predictor, synthetic, bounds):
     corner = infill.CORNER * predictor.objectives(synthetic.designs).max(axis=0)
     candidates = np.vstack([[51.0, 44.0, 27.0], synthetic.anywhere(300, np.random.default_rng(1))])
-    search = infill.Search(bounds, corner, 3, anything)
+    search = infill.Search(bounds, corner, 3, anything, NOTHING)
     chosen = infill.batch(predictor, candidates, 4, search, seed=1)
     assert [row.reason for row in chosen] == ["selected", *["improvement"] * 3]
     assert chosen[0].candidate == 0
@@ -84,7 +85,7 @@ def test_a_batch_holds_the_selected_design_and_others_apart_from_all(predictor, 
 
 def test_what_cannot_be_built_is_never_proposed(predictor, synthetic, bounds):
     candidates = synthetic.anywhere(60, np.random.default_rng(1))
-    search = infill.Search(bounds, np.array([0.1, 0.1]), 3, lambda design: design[0] < 55)
+    search = infill.Search(bounds, np.array([0.1, 0.1]), 3, lambda design: design[0] < 55, NOTHING)
     chosen = infill.batch(predictor, candidates, 4, search, seed=1)
     assert (candidates[[row.candidate for row in chosen], 0] < 55).all()
     with pytest.raises(files.InputError, match="only 0 can be built, a round needs 2"):
@@ -112,12 +113,12 @@ def propose(tmp_path, predictor, bounds):
     front["selected"] = [False, True]
     files.write_table(front, tmp_path / "front.csv")
 
-    def stage(**changes):
+    def stage(before=(), **changes):
         params = {"round": 2, "replicates": 3, "seed": 1, "case_of": lambda design: {}}
         params["names"] = ["infill_2_1", "infill_2_2", "infill_2_3"]
         params["bounds"] = dict(zip(names, bounds.tolist(), strict=True))
         inputs = [tmp_path / name for name in ("model.nc", "model.nc", "front.csv")]
-        infill.propose(params | changes, *inputs, tmp_path / "proposals.csv")
+        infill.propose(params | changes, *inputs, before, tmp_path / "proposals.csv")
         return tmp_path / "proposals.csv"
 
     return stage
@@ -137,6 +138,16 @@ def test_the_table_names_each_design_and_a_simulation_finds_it_there(propose, pr
     assert found == table.loc[1, factors].to_dict()
     with pytest.raises(files.InputError, match="has no infill_2_9"):
         verify.found_design("infill_2_9", propose(), factors)
+
+
+def test_what_was_proposed_before_is_not_proposed_again(propose, predictor, bounds, tmp_path):
+    """Not even where all its runs jammed and were dropped, so that the surrogate knows nothing of it."""
+    factors = list(predictor.factors)
+    path = propose().rename(tmp_path / "earlier.csv")
+    first, second = pd.read_csv(path), pd.read_csv(propose(before=[path]))
+    assert first["chosen_as"][0] == "selected" and second["chosen_as"][0] != "selected"
+    apart = infill.separation(second[factors].to_numpy(), first[factors].to_numpy(), bounds)
+    assert (apart >= infill.APART).all()
 
 
 def test_same_seed_same_proposals_and_another_round_others(propose):

@@ -1,5 +1,7 @@
 """Sobol' indices of a function with known ones, and of surrogates of known curves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -85,6 +87,13 @@ def test_the_processes_find_what_the_curves_depend_on(run, synthetic):
     assert np.mean(within) == 1
     assert table.loc[("discharge_time", "length_mm"), "first_low"] > 0.8
     assert table.loc[("discharge_time", "theta_deg"), "total"] < 0.1
+
+
+def test_what_no_component_holds_is_no_interaction(run, synthetic):
+    """Noise of each design's own would raise the total index of every factor."""
+    model = gaussian.fit(synthetic.training(3))
+    plain, noisy = (run(replace(model, rest=np.float64(rest))) for rest in (0, 0.5))
+    assert plain.equals(noisy)
 
 
 def test_a_single_network_has_indices_without_intervals(run):

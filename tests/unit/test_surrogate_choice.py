@@ -88,6 +88,8 @@ def test_auto_fits_the_surrogate_that_it_chose(chosen, name, caplog):
         assert len(predictor.model.members) == (5 if name.startswith("ensemble") else 1)
     assert ("hidden_nodes" in attributes) == (name == "network_clipped")
     assert (predictor.objective_error > 0).all()
+    if name == "network":  # as far off as in the comparison: 0.3 of 0.01
+        np.testing.assert_allclose(predictor.objective_error, 0.003, rtol=0.3)
     assert "detectable" not in caplog.text
 
 

@@ -63,6 +63,7 @@ rule propose:
         surrogate=lambda wildcards: of_round(int(wildcards.round) - 1, "model.nc"),
         plan=of_round(0, "model.nc"),
         front=lambda wildcards: of_round(int(wildcards.round) - 1, "front.csv"),
+        proposals=lambda wildcards: proposals_to(int(wildcards.round) - 1),
     output:
         report(
             result("infill/round_{round}/proposals.csv"),
@@ -79,7 +80,8 @@ rule propose:
         runtime=10,
     shell:
         "python -m hopperopt propose --params {params.settings:q} --surrogate {input.surrogate:q} "
-        "--plan {input.plan:q} --front {input.front:q} --output {output:q} > {log:q} 2>&1"
+        "--plan {input.plan:q} --front {input.front:q} --proposals {input.proposals:q} --output {output:q} "
+        "> {log:q} 2>&1"
 
 
 rule infill_simulate:

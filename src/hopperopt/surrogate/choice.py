@@ -56,8 +56,8 @@ def choose(
         data["target_fraction"].values,
         _fitted(name, data, params),
     )
-    if name == "network":
-        error = prediction.load(network[0]).objective_error
+    if name == "network":  # compared, and not the one of `train`, whose targets are clipped
+        error = np.sqrt(errors[name].mean(axis=0))
     else:
         error = _spread(predictor, data, params["seed"])
     predictor = predictor._replace(objective_error=error)

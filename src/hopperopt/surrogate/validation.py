@@ -110,21 +110,28 @@ def noise_floor(data: xr.Dataset, rng: np.random.Generator) -> dict[str, float]:
 
     Of the curves that is the variance of the mean curves. For J each experiment is simulated again many times
     around its curve. The true J^2 are the U drawn together to the spread that they have without noise, and
-    not below 0.
+    not below 0; the curve's departure from the batch, where noise has its part, is scaled to them.
     """
     target, variance, U = (
         data[name].transpose("experiment", "output", ...).values for name in ("target", "variance", "U")
     )
-    noise, batch, deviations = gaussian.run_variance(data), data["target_fraction"].values, []
-    for curve, own, runs in zip(target, variance, data["runs"].values, strict=True):
-        departure = np.sqrt(np.maximum((curve - batch[:, None]) ** 2 - own, 0))
-        draws = np.broadcast_to(batch[:, None] + departure, (DRAWS, *curve.shape))
-        drawn = simulations(draws, noise, runs, batch, rng)[1]
-        deviations.append(drawn - np.mean(departure**2, axis=-1))
-    deviation, mean = np.array(deviations), U.mean(axis=0)  # (experiments, draws, outputs)
-    noisy = np.mean(deviation**2, axis=(0, 1)) / np.maximum(U.var(axis=0), np.finfo(float).tiny)
-    true = np.maximum(mean + np.sqrt(np.maximum(1 - noisy, 0)) * (U - mean), 0)[:, None]
-    errors = signed_root(true + deviation) - np.sqrt(true)
+    noise, batch = gaussian.run_variance(data), data["target_fraction"].values
+
+    def deviations(departure):
+        """Of U from the mean square of departures (experiments, outputs, m): (experiments, draws, 2)."""
+        found = []
+        for own, runs in zip(departure, data["runs"].values, strict=True):
+            draws = np.broadcast_to(batch[:, None] + own, (DRAWS, *own.shape))
+            found.append(simulations(draws, noise, runs, batch, rng)[1] - np.mean(own**2, axis=-1))
+        return np.array(found)
+
+    departure = np.sqrt(np.maximum((target - batch[:, None]) ** 2 - variance, 0))
+    mean, tiny = U.mean(axis=0), np.finfo(float).tiny
+    noisy = np.mean(deviations(departure) ** 2, axis=(0, 1)) / np.maximum(U.var(axis=0), tiny)
+    true = np.maximum(mean + np.sqrt(np.maximum(1 - noisy, 0)) * (U - mean), 0)
+    scale = np.sqrt(true / np.maximum(np.mean(departure**2, axis=-1), tiny))
+    true = true[:, None]
+    errors = signed_root(true + deviations(departure * scale[..., None])) - np.sqrt(true)
     return _row(variance.mean(axis=(0, 2)), np.sqrt(np.mean(errors**2, axis=(0, 1))))
 
 
