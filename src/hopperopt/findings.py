@@ -21,6 +21,7 @@ SHORTEST_STEP, USUAL_STEP = 1e-4, 0.4  # Rayleigh times
 TESTED = {"step": 0.78, "restitution": 0.7, "static_friction": 0.5}
 USUAL_COMPRESSION, USUAL_SWING, USUAL_REBOUND = 0.25, 2.1, 1.7  # see hopperopt.impact
 USUAL_SIZES = 2.5  # coarse over fine diameter
+USUAL_EDGE = 20  # degrees: at a sharper one, 6 % of a sphere's radius into one face is in the other as well
 
 
 class Finding(NamedTuple):
@@ -46,6 +47,7 @@ def refused(setup):
     size, is no mistake of its own."""
     found = list(_hopper(setup)) or list(_filling(setup)) or list(_time_step(setup))
     yield from found
+    yield from _sensor(setup)
     if setup.insert_profile is not None and not any(finding.key.startswith("hopper") for finding in found):
         yield from _insert(setup)
 
@@ -90,6 +92,14 @@ def _time_step(setup):
     elif setup.time_step < SHORTEST_STEP * rayleigh:
         allowed = f"at least {SHORTEST_STEP * rayleigh:.3g} ({SHORTEST_STEP:g} Rayleigh times, s)"
         yield _no("simulation.time_step_s", "short", -setup.time_step, f"{setup.time_step:g}", allowed)
+
+
+def _sensor(setup):
+    """A sensor so deep that the run ends, as idle, before the first sphere that falls freely arrives."""
+    fall = math.sqrt(2 * -setup.discharge.sensor_mm / MM / setup.simulation.gravity_m_s2)
+    if (limit := setup.discharge.idle_limit_s) <= fall:
+        allowed = f"more than {fall:.3g} (s, in which a sphere falls from the outlet to the sensor)"
+        yield _no("discharge.idle_limit_s", "idle", fall, f"{limit:g}", allowed)
 
 
 def _insert(setup):
@@ -166,6 +176,9 @@ def unusual(setup):
         text = f"its radius, {width * MM:.3g} mm{{where}}, is less than a coarse sphere's"
         text += _unit(width * MM, coarse / 2 * MM, setup.hopper.cylinder_radius_mm)
         yield Finding(f"insert.{setup.insert.shape}", "thin", -width, text)
+    if (edge := geometry.sharpest_edge(profile)) < USUAL_EDGE:
+        text = f"an edge of {edge:.3g} degrees{{where}}: a sphere pressed on one of its faces feels both"
+        yield Finding(f"insert.{setup.insert.shape}", "edge", -edge, f"{text}; usual: {USUAL_EDGE} or more")
     apex, level = float(profile[:, 1].max()) * MM, setup.filling.level_mm
     if apex > level:
         text = f"its top, at {apex:.3g} mm, stands above the bed's surface, at {level:g} mm{{where}}"

@@ -178,11 +178,14 @@ def crosses_axis(profile):
 def inner_radius(profile):
     """Radius (m) of the smallest circle that a sphere sees from inside, infinity when none.
 
-    The faces that look towards the axis count; a shell shows both of its faces, a solid the outer one. A
-    sphere larger than such a circle would touch it all around, not in one point of its meridian plane.
+    The faces that look towards the axis count; a shell shows both of its faces, and the rim of a level face
+    that leads away from the axis, a solid the outer one. A sphere larger than such a circle would touch it
+    all around, not in one point of its meridian plane.
     """
     (r1, z1), (r2, z2) = profile[:-1].T, profile[1:].T
     towards_axis = z1 != z2
+    towards_axis[0] |= 0 < r1[0] < r2[0]
+    towards_axis[-1] |= 0 < r2[-1] < r1[-1]
     if is_solid(profile):
         outward = np.sign(_swept(profile, -np.inf, np.inf))  # anti-clockwise in (r, z): dz is r's normal
         towards_axis = outward * (z2 - z1) < 0
@@ -200,6 +203,21 @@ def shallowest_upper_face(profile):
         upwards = np.sign(_swept(profile, -np.inf, np.inf)) * np.diff(profile[:, 0]) < 0
     slopes = np.degrees(np.arctan2(rise, along))
     return float(np.min(slopes, where=upwards, initial=np.inf))
+
+
+def sharpest_edge(profile):
+    """Smallest angle (degrees) between two faces of a solid at an edge off the axis, measured inside;
+    infinity for a shell, or where there is no edge.
+    """
+    if not is_solid(profile):
+        return np.inf
+    along = np.diff(profile, axis=0)
+    if np.array_equal(profile[0], profile[-1]):
+        along = np.vstack([along, along[:1]])
+    before, after = along[:-1], along[1:]
+    turns = np.arctan2(_cross(before, after), np.sum(before * after, axis=1))
+    outward = np.sign(_swept(profile, -np.inf, np.inf))  # anti-clockwise: the solid lies on the left
+    return float(np.min(180.0 - np.degrees(outward * turns), initial=np.inf))
 
 
 def opening_radius(profile):

@@ -53,16 +53,23 @@ class Envelope:
         return int(np.count_nonzero(self.outside))
 
 
-def radius_at(profile, z):
-    """Outer radius (m) of a closed revolved profile at heights z (n,), 0 where it is not; profile may be
-    None."""
-    outer = np.zeros(len(z))
+def radii_at(profile, z):
+    """Inner and outer radii (m) of a revolved profile at heights z (n,); a body on the axis begins there.
+
+    0 and 0 where the profile is not; it may be None.
+    """
+    inner, outer = np.full(len(z), np.inf), np.zeros(len(z))
     for (r1, z1), (r2, z2) in pairwise(profile or ()):
         low, high = min(z1, z2), max(z1, z2)
         share = (z - z1) / (z2 - z1) if z2 != z1 else np.zeros(len(z))
         inside = (z >= low) & (z <= high)
-        outer = np.where(inside, np.maximum(outer, r1 + share * (r2 - r1)), outer)
-    return outer
+        r = r1 + share * (r2 - r1)
+        inner, outer = (
+            np.where(inside, np.minimum(inner, r), inner),
+            np.where(inside, np.maximum(outer, r), outer),
+        )
+    on_axis = any(r == 0.0 for r, _ in profile or ())
+    return np.where(np.isfinite(inner) & (not on_axis), inner, 0.0), outer
 
 
 class FlowPattern:
@@ -87,7 +94,7 @@ class FlowPattern:
         x, y, z = position[inside].T
         r, down = np.hypot(x, y), -velocity[inside, 2]
         near_wall = r > self._wall_radius - self._coarse
-        near_axis = r - radius_at(self._insert, z) < 2.0 * self._coarse
+        near_axis = r - radii_at(self._insert, z)[1] < 2.0 * self._coarse
         for k, region in enumerate((near_wall, near_axis)):
             self.sums[k] += down[region].sum()
             self.counts[k] += np.count_nonzero(region)
@@ -106,15 +113,16 @@ def filling_level(position, radius, contacts, case):
     """Height of the bed's top, m: mean over ten rings of equal area of the highest sphere top.
 
     Spheres with fewer than two contacts are in flight and no part of the bed. Rings that the insert covers at
-    the level asked for are left out, as are empty ones.
+    the level asked for, be it in part, are left out, as are empty ones.
 
     Arguments: positions (n, 3) and radii (n,), m; contacts of each sphere (n,); the case.
     """
     resting = contacts >= 2
     position, tops = position[resting], (position[:, 2] + radius)[resting]
     cylinder = case["walls"]["hopper"][-1][0]
-    covered = radius_at(case["walls"]["insert"], np.array([case["filling"]["level"]]))[0]
+    (inner,), (outer,) = radii_at(case["walls"]["insert"], np.array([case["filling"]["level"]]))
     edges = cylinder * np.sqrt(np.arange(LEVEL_RINGS + 1) / LEVEL_RINGS)
     ring = np.searchsorted(edges, np.hypot(position[:, 0], position[:, 1]), side="right") - 1
-    heights = [tops[ring == k].max() for k in range(LEVEL_RINGS) if edges[k] >= covered and np.any(ring == k)]
+    free = [k for k in range(LEVEL_RINGS) if edges[k] >= outer or edges[k + 1] <= inner]
+    heights = [tops[ring == k].max() for k in free if np.any(ring == k)]
     return float(np.mean(heights)) if heights else np.nan

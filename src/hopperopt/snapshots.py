@@ -52,7 +52,12 @@ class _Recorded(_Experiment):
         self.record()
 
     def record(self):
-        """Keep where the particles are and how fast they move."""
+        """Keep where the particles are and how fast they move.
+
+        Once: a run that goes on from a checkpoint may have been here just before.
+        """
+        if len(self.snapshot_times) and self.snapshot_times[-1] == self.simulation.time:
+            return
         velocity = self.simulation.by_identity(self.simulation.spheres.velocity)
         speed = np.sqrt(np.sum(velocity**2, axis=1, keepdims=True))
         snapshot = np.concatenate([self.positions(), speed], axis=1).astype(np.float32)

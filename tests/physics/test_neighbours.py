@@ -5,7 +5,16 @@ import copy
 import numpy as np
 import pytest
 
-from hopperopt.dem.state import PAIR_CARRIED, REBUILDS, STALE, TOUCH_CARRIED, make_pairs, make_touches
+from hopperopt.dem.neighbours import CELLS_PER_SPHERE, make_grid
+from hopperopt.dem.state import (
+    PAIR_CARRIED,
+    REBUILDS,
+    STALE,
+    TOUCH_CARRIED,
+    make_pairs,
+    make_spheres,
+    make_touches,
+)
 
 SIZES = np.array([0.001, 0.0015, 0.002])
 CAN = {"can": [[0.0, 0.0], [0.016, 0.0], [0.016, 0.5]]}
@@ -226,3 +235,15 @@ def test_nothing_is_left_aside_after_a_rebuild(bed):
     bed.advance(1)
     assert (bed.counters[[PAIR_CARRIED, TOUCH_CARRIED]] == -1).all()
     assert sorted(bed.spheres.identity[: bed.rows]) == list(range(1200))
+
+
+@pytest.mark.parametrize("far", [0.1, 1e3, 1e5, 1e8])
+def test_one_sphere_far_away_is_in_a_cell_of_the_grid(far):
+    """A run that blows up: however far the sphere, its cell exists, and the cells stay few."""
+    count = 200_000
+    position = np.random.default_rng(1).uniform(0.0, 0.1, (count, 3))
+    position[-1, 0] = far
+    spheres = make_spheres(position, np.zeros((count, 3)), np.full(count, 0.001), 1000.0)
+    corner, size, cells = make_grid(spheres, count, 0.005)
+    assert cells.prod() <= CELLS_PER_SPHERE * count + 4096
+    assert (np.floor((position.max(axis=0) - corner) / size) < cells).all()

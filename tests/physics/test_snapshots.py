@@ -97,3 +97,13 @@ def test_every_field_that_changes_is_saved(case):
     plain = experiment._Experiment(case, None, 1, None)
     fresh = snapshots._Recorded(case | {"snapshot_interval": INTERVAL}, None, 1, None)
     assert vars(fresh).keys() - vars(plain).keys() == set(snapshots.EVOLVING)
+
+
+def test_a_moment_is_recorded_once(case):
+    """A run that goes on from a checkpoint asks again at the moment at which it was saved."""
+    fresh = snapshots._Recorded(case | {"snapshot_interval": INTERVAL}, None, 1, None)
+    for _ in range(2):
+        fresh.record()
+        fresh.record()
+        fresh.simulation.advance(1)
+    assert fresh.snapshot_times.tolist() == [0, case["time_step"]]

@@ -273,6 +273,22 @@ def test_metres_for_millimetres_are_one_sentence_that_asks(changes, key, said):
 
 
 @pytest.mark.parametrize(
+    "changes", [{"discharge": {"sensor_mm": -1300}}, {"simulation": {"gravity_m_s2": 0.05}}]
+)
+def test_sensor_that_no_sphere_reaches_before_the_run_counts_as_idle(changes):
+    line = only(changes)
+    assert line.startswith("discharge.idle_limit_s: 0.5 is not allowed; allowed: more than 0.")
+    assert "falls from the outlet to the sensor" in line
+
+
+def test_sharp_edge_of_an_insert_is_a_warning():
+    changes = {"factors": {"theta_deg": {"key": "insert.cone.slope_deg", "levels": [16, 18, 30, 40, 50]}}}
+    changes |= {"insert": {"cone": {"length_mm": 20}}}
+    (line,) = [line for line in config.parse(changes).warnings() if "feels both" in line]
+    assert line.startswith("insert.cone: an edge of 16 degrees") and "usual: 20 or more" in line
+
+
+@pytest.mark.parametrize(
     ("changes", "key", "said"),
     [
         ({"discharge": {"sensor_mm": -0.012}}, "discharge.sensor_mm", "(in metres? 0.012 m is 12 mm)"),

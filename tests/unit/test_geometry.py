@@ -143,17 +143,37 @@ def test_profile_that_crosses_the_axis(profile, axis):
     ("profile", "radius"),
     [
         (geometry.hopper(0.0225, 45, 0.05, 0.2), 0.0225),
-        (geometry.hopper(0.01, 90, 0.05, 0.2), 0.05),
+        (geometry.hopper(0.01, 90, 0.05, 0.2), 0.01),  # a flat bottom's rim
         (geometry.gate(0.02), np.inf),
         (geometry.cone(55, 0.04), np.inf),
         (geometry.cone(55, 0.04)[::-1], np.inf),
         (np.array([[0, 1], [2, 0], [0, 3.0]]), 0),  # hollow from below
         (np.array([[2, 0], [3, 0], [3, 1], [2, 1], [2, 0.0]]), 2),  # a ring, from inside
         (np.array([[1, 0], [2, 1.0]]), 1),  # a shell shows both faces
+        (np.array([[0, 0], [3, 0], [3, 1], [1, 1.0]]), 1),  # a lid with a hole
+        (np.array([[1, 1], [3, 1], [3, 0], [0, 0.0]]), 1),
+        (np.array([[0, 1], [1, 1], [3, 0.0]]), 1),
     ],
 )
 def test_smallest_circle_seen_from_inside(profile, radius):
     assert geometry.inner_radius(profile) == radius
+
+
+@pytest.mark.parametrize(
+    ("profile", "angle"),
+    [
+        (geometry.cone(16, 0.04), 16),
+        (geometry.cone(16, 0.04)[::-1], 16),
+        (geometry.double_cone(10, 15, 0.04), 25),
+        (geometry.bullet(0.02, 0.01, 55), 90),
+        (np.array([[2, 0], [3, 0], [3, 1], [2, 0.0]]), 45),  # a ring; its first corner and its last
+        (np.array([[3, 0], [3, 1], [2, 0], [3, 0.0]]), 45),
+        (np.array([[0, 0], [2, 0], [1, 1], [2, 2], [0, 2.0]]), 45),  # re-entrant between two sharp edges
+        (np.array([[0, 0], [2, 1.0]]), np.inf),  # a shell
+    ],
+)
+def test_sharpest_edge_of_a_solid(profile, angle):
+    assert geometry.sharpest_edge(profile) == pytest.approx(angle)
 
 
 def test_insert_beyond_the_wall_is_not_inside():

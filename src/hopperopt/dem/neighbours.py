@@ -96,9 +96,10 @@ def make_grid(spheres, count, reach):
     size = np.array([reach / SLICES, reach, reach])
     cells = np.ones(3, np.int64)
     while True:
-        for a in range(3):
-            cells[a] = int(min(math.floor((high[a] - low[a]) / size[a]), 1.0e6)) + 1
-        if cells[0] * cells[1] * cells[2] <= CELLS_PER_SPHERE * count + 4096:
+        number = np.floor((high - low) / size) + 1.0  # of cells; integers might overflow
+        if number[0] * number[1] * number[2] <= CELLS_PER_SPHERE * count + 4096:
+            for a in range(3):
+                cells[a] = int(number[a])
             return low, size, cells
         size *= 1.25
 
