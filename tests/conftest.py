@@ -28,9 +28,8 @@ def make_report_study():
     from hopperopt import config, dataset, effects, outflow
     from hopperopt.report import page
 
-    rng = np.random.default_rng(1)
-
     def run(case, status="complete"):
+        rng = np.random.default_rng(case["seed"])
         size_class = np.arange(60) % 3
         place = np.column_stack([rng.uniform(-0.03, 0.03, (60, 2)), rng.uniform(0.03, 0.07, 60)])
         scalars = dict.fromkeys(dataset.RUN - {"exit_time", "diameter", "size_class"}, 0.5)
