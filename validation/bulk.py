@@ -28,7 +28,7 @@ from scipy.spatial import cKDTree
 
 from hopperopt import geometry
 from hopperopt.figures import style
-from hopperopt.monitors import radius_at
+from hopperopt.monitors import radii_at
 from hopperopt.outflow import batch_fractions
 from validation import experiments
 from validation.report import Row, at_most
@@ -105,7 +105,7 @@ def _free(meridian, walls, margin):
     r, z = meridian.T
     free = r < np.interp(z, *np.array(walls["hopper"]).T[::-1])
     if walls["insert"] is not None:
-        free &= r > radius_at(walls["insert"], z)
+        free &= r > radii_at(walls["insert"], z)[1]
     for profile in walls.values():
         if profile is not None:
             free &= _distance(meridian, np.array(profile)) >= margin

@@ -162,12 +162,22 @@ def crosses_itself(profile):
 
 def folds_back(profile):
     """True when a segment has no length or runs back over the one before it."""
+    before, after = _corners(profile)
+    reversed_ = (_cross(before, after) == 0) & (np.sum(before * after, axis=1) <= 0)
+    return bool(reversed_.any() or (np.abs(np.diff(profile, axis=0)).sum(axis=1) == 0).any())
+
+
+def _corners(profile):
+    """Vectors (corners, 2) of the segments before and after each corner, that of a closed loop's ends too."""
     along = np.diff(profile, axis=0)
     if np.array_equal(profile[0], profile[-1]):
         along = np.vstack([along, along[:1]])
-    before, after = along[:-1], along[1:]
-    reversed_ = (_cross(before, after) == 0) & (np.sum(before * after, axis=1) <= 0)
-    return bool(reversed_.any() or (np.abs(along).sum(axis=1) == 0).any())
+    return along[:-1], along[1:]
+
+
+def _turn(profile):
+    """1 for a solid that lies on the left of its profile, anti-clockwise in (r, z), -1 on the right."""
+    return np.sign(_swept(profile, -np.inf, np.inf))
 
 
 def crosses_axis(profile):
@@ -183,12 +193,12 @@ def inner_radius(profile):
     all around, not in one point of its meridian plane.
     """
     (r1, z1), (r2, z2) = profile[:-1].T, profile[1:].T
-    towards_axis = z1 != z2
-    towards_axis[0] |= 0 < r1[0] < r2[0]
-    towards_axis[-1] |= 0 < r2[-1] < r1[-1]
     if is_solid(profile):
-        outward = np.sign(_swept(profile, -np.inf, np.inf))  # anti-clockwise in (r, z): dz is r's normal
-        towards_axis = outward * (z2 - z1) < 0
+        towards_axis = _turn(profile) * (z2 - z1) < 0
+    else:
+        towards_axis = z1 != z2
+        towards_axis[0] |= 0 < r1[0] < r2[0]
+        towards_axis[-1] |= 0 < r2[-1] < r1[-1]
     return float(np.min(np.minimum(r1, r2), where=towards_axis, initial=np.inf))
 
 
@@ -200,7 +210,7 @@ def shallowest_upper_face(profile):
     along, rise = np.abs(np.diff(profile[:, 0])), np.abs(np.diff(profile[:, 1]))
     upwards = along > 0
     if is_solid(profile):
-        upwards = np.sign(_swept(profile, -np.inf, np.inf)) * np.diff(profile[:, 0]) < 0
+        upwards = _turn(profile) * np.diff(profile[:, 0]) < 0
     slopes = np.degrees(np.arctan2(rise, along))
     return float(np.min(slopes, where=upwards, initial=np.inf))
 
@@ -211,13 +221,9 @@ def sharpest_edge(profile):
     """
     if not is_solid(profile):
         return np.inf
-    along = np.diff(profile, axis=0)
-    if np.array_equal(profile[0], profile[-1]):
-        along = np.vstack([along, along[:1]])
-    before, after = along[:-1], along[1:]
+    before, after = _corners(profile)
     turns = np.arctan2(_cross(before, after), np.sum(before * after, axis=1))
-    outward = np.sign(_swept(profile, -np.inf, np.inf))  # anti-clockwise: the solid lies on the left
-    return float(np.min(180.0 - np.degrees(outward * turns), initial=np.inf))
+    return float(np.min(180.0 - np.degrees(_turn(profile) * turns), initial=np.inf))
 
 
 def opening_radius(profile):

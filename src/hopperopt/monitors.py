@@ -64,10 +64,8 @@ def radii_at(profile, z):
         share = (z - z1) / (z2 - z1) if z2 != z1 else np.zeros(len(z))
         inside = (z >= low) & (z <= high)
         r = r1 + share * (r2 - r1)
-        inner, outer = (
-            np.where(inside, np.minimum(inner, r), inner),
-            np.where(inside, np.maximum(outer, r), outer),
-        )
+        inner = np.minimum(inner, np.where(inside, r, np.inf))
+        outer = np.maximum(outer, np.where(inside, r, 0.0))
     on_axis = any(r == 0.0 for r, _ in profile or ())
     return np.where(np.isfinite(inner) & (not on_axis), inner, 0.0), outer
 
@@ -81,8 +79,7 @@ class FlowPattern:
 
     def __init__(self, case):
         self._coarse = case["particles"]["diameters"][-1]
-        insert = case["walls"]["insert"]
-        self._insert = insert if insert and min(r for r, _ in insert) == 0.0 else None  # not a ring
+        self._insert = case["walls"]["insert"]
         self._wall_radius = case["walls"]["hopper"][-1][0]
         self.sums, self.counts, self.samples = np.zeros(2), np.zeros(2), 0
 
@@ -94,7 +91,8 @@ class FlowPattern:
         x, y, z = position[inside].T
         r, down = np.hypot(x, y), -velocity[inside, 2]
         near_wall = r > self._wall_radius - self._coarse
-        near_axis = r - radii_at(self._insert, z)[1] < 2.0 * self._coarse
+        inner, outer = radii_at(self._insert, z)
+        near_axis = r - np.where(inner > 0.0, 0.0, outer) < 2.0 * self._coarse  # a ring leaves the axis free
         for k, region in enumerate((near_wall, near_axis)):
             self.sums[k] += down[region].sum()
             self.counts[k] += np.count_nonzero(region)

@@ -48,8 +48,7 @@ def judge(cases: Sequence[Case], target: np.ndarray) -> pd.DataFrame:
     target (size class,): mass fractions m_k0 of the batch. J is that of the mean curve of n runs. Differences
     are those of U, a case's less the bare hopper's, negative for less segregation; `detectable` is the
     smallest one that the row's test, adjusted for the others as the least of their p-values is, finds with a
-    power of 80 %. Empty: what needs a run, a prediction or a bare hopper
-    that is not there.
+    power of 80 %. Empty: what needs a run, a prediction or a bare hopper that is not there.
     """
     runs = uncertainty.stacked([case.runs for case in cases])
     simulated = uncertainty.estimate(runs, target, uncertainty.pooled_variance(runs))
@@ -59,7 +58,8 @@ def judge(cases: Sequence[Case], target: np.ndarray) -> pd.DataFrame:
     predicted = Prediction._make([*stacks, squared])
     difference = simulated - _bare([case.kind for case in cases], simulated)
     primary = np.array([case.kind == PRIMARY for case in cases])
-    better, worse = (_adjusted(p, primary) for p in (difference.p_below(), 1 - difference.p_below()))
+    p = difference.p_below()
+    better, worse = _adjusted(p, primary), _adjusted(1 - p, primary)
     low, high = simulated.interval()
     diff_low, diff_high = difference.interval()
     values = {
@@ -78,7 +78,7 @@ def judge(cases: Sequence[Case], target: np.ndarray) -> pd.DataFrame:
         "p_holm": better,
         "better_than_bare": np.where(np.isnan(better), None, better < uncertainty.LEVEL),
         "verdict": _words(better, worse),
-        "detectable": difference.detectable(_levels(difference.p_below(), primary)),
+        "detectable": difference.detectable(_levels(p, primary)),
     }
     names = {
         "case": np.repeat([case.name for case in cases], len(OUTPUTS)),

@@ -61,25 +61,15 @@ def text_of(browser, selector):
 
 
 def move_to(browser, selector):
-    """Point at the middle of an element as drawn, until a busy browser has told the page of it."""
+    """Point at the middle of an element as drawn, and wait until a busy browser has taken notice."""
     from selenium.webdriver import ActionChains
     from selenium.webdriver.support.wait import WebDriverWait
 
-    listen = """
-    const [selector] = arguments;
-    document.querySelector(selector).scrollIntoView({block: "center"});
-    window.told = false;
-    document.addEventListener("pointermove", event => {
-      window.told = document.querySelector(selector).contains(event.target);
-    }, true);  // before the page redraws what was pointed at"""
-    browser.execute_script(listen, selector)
-
-    def is_told(_):
-        element = browser.find_element("css selector", selector)
-        ActionChains(browser).move_to_element(element).move_by_offset(1, 0).perform()
-        return browser.execute_script("return window.told")
-
-    WebDriverWait(browser, 30).until(is_told)
+    element = browser.find_element("css selector", selector)
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
+    ActionChains(browser).move_to_element(element).move_by_offset(1, 0).perform()
+    below = "return arguments[0].matches(':hover')"
+    WebDriverWait(browser, 30).until(lambda _: browser.execute_script(below, element))
     browser.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
 
 

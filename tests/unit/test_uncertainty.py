@@ -161,8 +161,17 @@ def test_single_runs_without_segregation_scatter_around_zero():
         assert np.mean((low[:, k] < 0) & (high[:, k] > 0)) > 0.86
 
 
+def test_a_difference_is_detected_as_often_as_it_is_said():
+    """With the true difference at `detectable`, four tests of five find it."""
+    rng = np.random.default_rng(9)
+    variance = np.full(4000, 0.09)
+    size = uncertainty.Estimate(np.zeros(1), variance[:1]).detectable(uncertainty.LEVEL)
+    found = uncertainty.Estimate(-size + 0.3 * rng.normal(size=4000), variance).p_below() < uncertainty.LEVEL
+    assert found.mean() == pytest.approx(0.8, abs=0.02)
+
+
 @pytest.mark.parametrize("case", ["selected", "other_1"])
-def test_a_difference_is_detected_as_often_as_it_is_said(case):
+def test_a_verdict_finds_a_difference_as_often_as_it_says(case):
     """With the true difference at `detectable`, four campaigns of five find it, after Holm where that is."""
     rng, objective = np.random.default_rng(9), "fine"
     spread = 1e-3
